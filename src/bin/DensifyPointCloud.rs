@@ -1,0 +1,3 @@
+//! The program `DensifyPointCloud`: drop-in for OpenMVS's.
+
+fn main() {}

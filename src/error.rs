@@ -1,0 +1,66 @@
+//! The one error type of the library: what was wrong, where, and what to do.
+
+use std::path::{Path, PathBuf};
+
+/// Result of this library's functions.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong. Every message is one line that names the place and, where there is one, the remedy.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file could not be opened, read, written or renamed.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Verb phrase: "open", "write", "create folder", ...
+        action: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file breaks its format.
+    #[error("{}: {source}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// The broken rule.
+        source: semvs_formats::Error,
+    },
+    /// A file was read but what it holds cannot be used.
+    #[error("{}: {what}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        what: String,
+    },
+    /// The scene or the options cannot be used as given.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+impl Error {
+    /// An [`Error::Io`] about `path`.
+    pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Error::Io { path: path.to_owned(), action, source }
+    }
+
+    /// An [`Error::Format`] about `path`; what the medium did wrong becomes an [`Error::Io`].
+    pub fn format(path: &Path, source: semvs_formats::Error) -> Self {
+        match source {
+            semvs_formats::Error::Io(source) => Error::io(path, "read or write", source),
+            source => Error::Format { path: path.to_owned(), source },
+        }
+    }
+
+    /// An [`Error::Content`] about `path`.
+    pub fn content(path: &Path, what: impl Into<String>) -> Self {
+        Error::Content { path: path.to_owned(), what: what.into() }
+    }
+
+    /// An [`Error::Invalid`].
+    pub fn invalid(what: impl Into<String>) -> Self {
+        Error::Invalid(what.into())
+    }
+}

@@ -1,0 +1,10 @@
+//! Oriented photographs to dense, semantically labelled 3D point clouds.
+//!
+//! The layout and the flow of data are described in `docs/ARCHITECTURE.md`.
+#![deny(unsafe_code)]
+
+mod error;
+pub mod geometry;
+pub mod scene;
+
+pub use error::{Error, Result};

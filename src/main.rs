@@ -1,0 +1,3 @@
+//! The program `semvs`.
+
+fn main() {}
