@@ -1,10 +1,14 @@
 //! The scene: views, sparse tracks, neighbours, and the rasters that belong to a view.
 
+mod cloud;
 mod grid;
 mod ids;
 mod maps;
 mod model;
+#[cfg(test)]
+pub(crate) mod synthetic;
 
+pub use cloud::{CloudLayout, CloudPoint, PointCloud, PointSink, PointSource};
 pub use grid::Grid;
 pub use ids::{ImageId, ViewIndex};
 pub use maps::{ColorImage, ConfidenceMap, DepthEstimate, DepthMap, GrayImage, LabelMap, NormalMap};
