@@ -6,6 +6,7 @@
 pub mod depth_filter;
 mod error;
 pub mod geometry;
+pub mod progress;
 pub mod scene;
 
 pub use error::{Error, Result};

@@ -1,0 +1,91 @@
+//! The options about semantic labels and the labelled outputs, as typed.
+
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// What labels are and what they decide.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Labels")]
+pub(crate) struct LabelInput {
+    /// Folder of label maps, one PNG per image: for DSC1.jpg the first of DSC1.png, DSC1.jpg.png, DSC1_l.png,
+    /// DSC1.label.png, DSC1.mask.png
+    #[arg(long, value_name = "DIR")]
+    pub(crate) label_path: Option<PathBuf>,
+    /// Classes: a TOML file, or a built-in table: 3dom-facade, cityscapes, ade20k, openmvs-aerial, ids
+    #[arg(long, value_name = "TABLE")]
+    pub(crate) class_table: Option<String>,
+    /// Keep only these classes: names or ids, separated by commas
+    #[arg(long, value_name = "A,B", value_delimiter = ',', conflicts_with = "exclude_classes")]
+    pub(crate) classes: Vec<String>,
+    /// Drop these classes: names or ids, separated by commas
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(crate) exclude_classes: Vec<String>,
+    /// What labels decide in fusion [default: support, when there are labels]
+    #[arg(long, value_name = "MODE", value_enum)]
+    pub(crate) label_consistency: Option<ConsistencyMode>,
+    /// Width in pixels of the band along class borders whose labels decide nothing
+    #[arg(long, value_name = "PIXELS", default_value_t = 0)]
+    pub(crate) label_border: u32,
+    /// A view without a label map
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = WhenMissing::Error)]
+    pub(crate) missing_labels: WhenMissing,
+    /// A colour or id that the class table does not hold
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = WhenMissing::Error)]
+    pub(crate) unknown_label: WhenMissing,
+}
+
+/// What is written besides the cloud, and how.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct LabelOutput {
+    /// Also write one cloud per class: OUT.<class>.ply
+    #[arg(long)]
+    pub(crate) split_by_class: bool,
+    /// Also write the cloud in the colours of its classes: OUT.labels.ply
+    #[arg(long)]
+    pub(crate) color_by_label: bool,
+    /// Write a summary of the run as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
+    /// "plain": no lists, opens everywhere; "openmvs": with the views of every point
+    #[arg(long, value_name = "LAYOUT", value_enum)]
+    pub(crate) ply_layout: Option<PlyLayout>,
+}
+
+/// Both groups.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct LabelOptions {
+    #[command(flatten)]
+    pub(crate) input: LabelInput,
+    #[command(flatten)]
+    pub(crate) output: LabelOutput,
+}
+
+/// `--label-consistency`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ConsistencyMode {
+    /// nothing; points still get the label that most of their pixels have
+    Off,
+    /// a pixel of another class does not support a point
+    Support,
+    /// a pixel of another class rejects the point
+    Strict,
+}
+
+/// `--missing-labels`, `--unknown-label`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WhenMissing {
+    /// stop with a message
+    Error,
+    /// counts as unlabelled
+    Void,
+}
+
+/// `--ply-layout`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PlyLayout {
+    /// position, colour, normal, label
+    Plain,
+    /// and lists of views and weights, as OpenMVS writes them
+    Openmvs,
+}

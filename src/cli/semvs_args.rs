@@ -1,0 +1,180 @@
+//! The command line of `semvs`, as typed.
+
+use super::label_options::{LabelInput, PlyLayout};
+use super::options::SharedOptions;
+use clap::{ArgAction, Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Oriented photographs to dense, semantically labelled point clouds.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "semvs", version, propagate_version = true, after_help = EXAMPLES)]
+pub(crate) struct SemvsArgs {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Say more on stderr; twice for everything
+    #[arg(short, long, global = true, action = ArgAction::Count, help_heading = "Messages")]
+    pub(crate) verbose: u8,
+    /// Say only warnings and errors; twice for errors alone
+    #[arg(
+        short,
+        long,
+        global = true,
+        action = ArgAction::Count,
+        conflicts_with = "verbose",
+        help_heading = "Messages"
+    )]
+    pub(crate) quiet: u8,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  semvs densify scene.mvs -o cloud.ply -w depthmaps
+      photographs to a dense cloud; the depth maps stay in depthmaps/
+  semvs densify scene.mvs -o cloud.ply --label-path labels --class-table 3dom-facade \\
+      --exclude-classes sky,obstacle --split-by-class
+      the same with a class for every point, without sky and obstacles, and one cloud per class
+  semvs fuse scene.mvs --depth-maps depthmaps -o cloud.ply --number-views-fuse 2
+      fuse depth maps that exist, from here or from OpenMVS
+  semvs inspect depthmaps/depth0000.dmap
+      what is in a file";
+
+/// What to do.
+#[derive(Clone, Debug, Subcommand)]
+pub(crate) enum Command {
+    Densify(Box<DensifyArgs>),
+    Fuse(Box<FuseArgs>),
+    Convert(ConvertArgs),
+    Inspect(InspectArgs),
+    Evaluate(EvaluateArgs),
+}
+
+/// Make a dense cloud from a scene: depth maps, filters, fusion
+///
+/// Writes the cloud, the scene beside it (OUT.mvs), and one depth map per image into the working folder.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = DENSIFY_EXAMPLES)]
+pub(crate) struct DensifyArgs {
+    /// Scene with cameras, image names and sparse points (OpenMVS's .mvs)
+    #[arg(value_name = "SCENE.mvs")]
+    pub(crate) scene: PathBuf,
+    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene]
+    #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) shared: SharedOptions,
+}
+
+const DENSIFY_EXAMPLES: &str = "\
+Examples:
+  semvs densify scene.mvs -o out/cloud.ply -w out
+      everything into the folder out/
+  semvs densify scene.mvs -o draft.ply --resolution-level 2 --number-views 3 --geometric-iters 1
+      a quick look
+  semvs densify scene.mvs -o cloud.ply --label-path labels --class-table classes.toml --report run.json
+      with classes of your own: classes.toml holds [[class]] entries with id, name, color = [r, g, b]";
+
+/// Fuse depth maps that exist into a cloud, without estimating anything
+///
+/// Takes the depth maps of semvs and of OpenMVS (depthNNNN.dmap). The depth maps are only read.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = FUSE_EXAMPLES)]
+pub(crate) struct FuseArgs {
+    /// Scene that the depth maps belong to (OpenMVS's .mvs)
+    #[arg(value_name = "SCENE.mvs")]
+    pub(crate) scene: PathBuf,
+    /// Folder of the depth maps [default: the working folder]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) depth_maps: Option<PathBuf>,
+    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene]
+    #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) shared: SharedOptions,
+}
+
+const FUSE_EXAMPLES: &str = "\
+Examples:
+  semvs fuse scene.mvs --depth-maps depthmaps -o cloud.ply
+  semvs fuse scene.mvs --depth-maps depthmaps -o facade.ply --label-path labels --class-table 3dom-facade \\
+      --classes building,window,door --label-consistency strict";
+
+/// Turn depth maps into a cloud, every depth a point, without fusion
+#[derive(Clone, Debug, Args)]
+#[command(after_help = CONVERT_EXAMPLES)]
+pub(crate) struct ConvertArgs {
+    /// Depth maps (.dmap)
+    #[arg(value_name = "FILE.dmap", required = true)]
+    pub(crate) depth_maps: Vec<PathBuf>,
+    /// Cloud to write, .ply
+    #[arg(short, long, visible_alias = "output-file", value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Folder that the image names in the depth maps are relative to [default: the folder of each depth map,
+    /// then the current folder]
+    #[arg(short = 'w', long, value_name = "DIR")]
+    pub(crate) working_folder: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) labels: LabelInput,
+    /// Also write one cloud per class: OUT.<class>.ply
+    #[arg(long)]
+    pub(crate) split_by_class: bool,
+    /// Also write the cloud in the colours of its classes: OUT.labels.ply
+    #[arg(long)]
+    pub(crate) color_by_label: bool,
+    /// "plain": no lists, opens everywhere; "openmvs": with the view of every point
+    #[arg(long, value_name = "LAYOUT", value_enum, default_value_t = PlyLayout::Plain)]
+    pub(crate) ply_layout: PlyLayout,
+}
+
+const CONVERT_EXAMPLES: &str = "\
+Examples:
+  semvs convert depthmaps/depth0000.dmap -o view0.ply
+  semvs convert depthmaps/*.dmap -o all.ply --label-path labels --class-table 3dom-facade";
+
+/// Say what a file holds: scene, depth map, cloud, class table, label map
+#[derive(Clone, Debug, Args)]
+pub(crate) struct InspectArgs {
+    /// The file
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
+    /// As JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Hold a cloud against the true surface: accuracy, completeness, F1, gross errors, labels
+#[derive(Clone, Debug, Args)]
+#[command(after_help = EVALUATE_EXAMPLES)]
+pub(crate) struct EvaluateArgs {
+    /// Cloud to judge (.ply)
+    #[arg(value_name = "CLOUD.ply")]
+    pub(crate) cloud: PathBuf,
+    /// Points of the true surface (.ply); labels are judged when both clouds have them
+    #[arg(long, value_name = "TRUTH.ply")]
+    pub(crate) truth: PathBuf,
+    /// Distances at which a point counts as right, in scene units
+    #[arg(long, value_name = "D", num_args = 1.., value_delimiter = ',', required = true)]
+    pub(crate) thresholds: Vec<f64>,
+    /// Both clouds are thinned to one point per cube of this edge; 0 = not at all [default: half the smallest
+    /// threshold]
+    #[arg(long, value_name = "EDGE")]
+    pub(crate) voxel: Option<f64>,
+    /// Ids of the true classes that count: a point on any other class is wrong
+    #[arg(long, value_name = "ID", num_args = 1.., value_delimiter = ',')]
+    pub(crate) truth_classes: Vec<u16>,
+    /// Ids of the cloud's classes that are judged
+    #[arg(long, value_name = "ID", num_args = 1.., value_delimiter = ',')]
+    pub(crate) cloud_classes: Vec<u16>,
+    /// Ids of true classes left out of completeness and IoU
+    #[arg(long, value_name = "ID", num_args = 1.., value_delimiter = ',')]
+    pub(crate) ignore_truth_labels: Vec<u16>,
+    /// Also accuracy and completeness of every true class
+    #[arg(long)]
+    pub(crate) per_class: bool,
+    /// As JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const EVALUATE_EXAMPLES: &str = "\
+Example:
+  semvs evaluate cloud.ply --truth truth.ply --thresholds 0.02 0.05 0.1";

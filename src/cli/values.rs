@@ -1,0 +1,79 @@
+//! Values as people type them.
+
+use std::ffi::OsStr;
+use std::path::{Component, Path, PathBuf};
+
+/// 0/1, true/false, yes/no, on/off.
+pub(crate) fn boolean(text: &str) -> Result<bool, String> {
+    match text.to_ascii_lowercase().as_str() {
+        "1" | "true" | "yes" | "on" => Ok(true),
+        "0" | "false" | "no" | "off" => Ok(false),
+        _ => Err("expected one of 0, 1, true, false, yes, no, on, off".to_owned()),
+    }
+}
+
+/// A path as OpenMVS's tools take it: surrounding double quotes are dropped, backslashes are slashes.
+pub(crate) fn openmvs_path(typed: &Path) -> PathBuf {
+    match typed.to_str() {
+        Some(text) => PathBuf::from(text.trim_matches('"').replace('\\', "/")),
+        None => typed.to_owned(),
+    }
+}
+
+/// `path` as given when absolute, else under `base`; `.` and `a/..` are resolved by name.
+pub(crate) fn under(base: &Path, path: &Path) -> PathBuf {
+    simplify(&base.join(path))
+}
+
+fn simplify(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if matches!(out.components().next_back(), Some(Component::Normal(_))) => {
+                out.pop();
+            }
+            other => out.push(other),
+        }
+    }
+    if out.as_os_str().is_empty() { PathBuf::from(".") } else { out }
+}
+
+/// `path` followed by `suffix` in its last component.
+pub(crate) fn with_suffix(path: &Path, suffix: impl AsRef<OsStr>) -> PathBuf {
+    let mut text = path.as_os_str().to_owned();
+    text.push(suffix);
+    PathBuf::from(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn booleans_have_four_spellings_each() {
+        for (text, value) in [("1", true), ("TRUE", true), ("Yes", true), ("on", true)] {
+            assert_eq!(boolean(text), Ok(value));
+        }
+        for text in ["0", "false", "no", "OFF"] {
+            assert_eq!(boolean(text), Ok(false));
+        }
+        assert!(boolean("2").is_err());
+        assert!(boolean("").is_err());
+    }
+
+    #[test]
+    fn quotes_and_backslashes_are_cleaned() {
+        assert_eq!(openmvs_path(Path::new("\"a\\b c\"")), Path::new("a/b c"));
+    }
+
+    #[test]
+    fn relative_paths_go_under_the_working_folder() {
+        assert_eq!(under(Path::new("/w"), Path::new("./a/../b.mvs")), Path::new("/w/b.mvs"));
+        assert_eq!(under(Path::new("/w"), Path::new("/b.mvs")), Path::new("/b.mvs"));
+        assert_eq!(under(Path::new(""), Path::new("./b.mvs")), Path::new("b.mvs"));
+        assert_eq!(under(Path::new(""), Path::new("../b.mvs")), Path::new("../b.mvs"));
+        assert_eq!(under(Path::new(""), Path::new("..")), Path::new(".."));
+        assert_eq!(under(Path::new(""), Path::new(".")), Path::new("."));
+    }
+}
