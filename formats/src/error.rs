@@ -32,6 +32,14 @@ pub enum Error {
         /// Bytes allowed.
         limit: u64,
     },
+    /// A value that was read, or is about to be written, cannot be right.
+    #[error("{field}: {what}")]
+    Invalid {
+        /// Dotted path of the value, such as `images[3].camera`.
+        field: String,
+        /// The broken rule with the offending values.
+        what: String,
+    },
     /// A valid file of a kind or version that this crate does not handle.
     #[error("unsupported: {0}")]
     Unsupported(String),

@@ -1,10 +1,19 @@
 //! The one scene value that both `.mvs` containers convert to.
 
+use super::boxes::{Obb, StoredBox};
+use super::mesh::Mesh;
+
 /// "No such index": an uncalibrated image's platform, camera or pose.
 pub const NO_ID: u32 = u32::MAX;
 
+/// Row-major 3×3 identity.
+pub(crate) const IDENTITY3: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+/// Row-major 4×4 identity.
+pub(crate) const IDENTITY4: [f64; 16] =
+    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+
 /// Everything a `.mvs` file holds.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Rigs with their cameras and poses.
     pub platforms: Vec<Platform>,
@@ -20,8 +29,30 @@ pub struct Scene {
     pub line_colors: Vec<[u8; 3]>,
     /// Row-major 4×4, meant to relate the file's frame to an absolute one; never applied to coordinates.
     pub transform: [f64; 16],
-    /// Region of interest, if stored.
+    /// Region of interest; `None` if there is none or the stored one has no volume or no rotation.
     pub obb: Option<Obb>,
+    /// The region's bytes as the file had them, where `obb` does not say them all; else `None`. Writers use it
+    /// while `obb` is still what it means; leave it `None` in a new scene.
+    pub stored_box: Option<StoredBox>,
+    /// Surface (native archives only).
+    pub mesh: Mesh,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Scene {
+            platforms: Vec::new(),
+            images: Vec::new(),
+            points: PointCloud::default(),
+            lines: Vec::new(),
+            line_normals: Vec::new(),
+            line_colors: Vec::new(),
+            transform: IDENTITY4,
+            obb: None,
+            stored_box: None,
+            mesh: Mesh::default(),
+        }
+    }
 }
 
 /// A rig: cameras mounted on it and the poses it took.
@@ -54,6 +85,24 @@ pub struct Camera {
     pub center: [f64; 3],
 }
 
+impl Camera {
+    /// `k` as files without a resolution hold it: divided by `max(width, height)`, with the principal point
+    /// measured from the outer corner of the image: `(c + 0.5) / max - 0.5`. As it is if `width` is 0.
+    pub fn normalized_k(&self) -> [f64; 9] {
+        let mut k = self.k;
+        if self.width > 0 && self.height > 0 {
+            let scale = 1.0 / f64::from(self.width.max(self.height));
+            for i in [0, 1, 4] {
+                k[i] *= scale;
+            }
+            for i in [2, 5] {
+                k[i] = (k[i] + 0.5) * scale - 0.5;
+            }
+        }
+        k
+    }
+}
+
 /// A pose of a platform.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pose {
@@ -61,6 +110,26 @@ pub struct Pose {
     pub rotation: [f64; 9],
     /// Centre in the world.
     pub center: [f64; 3],
+}
+
+impl Default for Image {
+    /// An uncalibrated image without a name.
+    fn default() -> Self {
+        Image {
+            name: Vec::new(),
+            mask_name: Vec::new(),
+            platform: NO_ID,
+            camera: NO_ID,
+            pose: NO_ID,
+            id: NO_ID,
+            width: 0,
+            height: 0,
+            min_depth: 0.0,
+            avg_depth: 0.0,
+            max_depth: 0.0,
+            view_scores: Vec::new(),
+        }
+    }
 }
 
 /// An image of the scene.
@@ -133,6 +202,46 @@ pub struct Visibility {
     pub weights: Vec<f32>,
 }
 
+impl Visibility {
+    /// Number of lists.
+    pub fn len(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+
+    /// Whether there are no lists at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Where list `index` lies in `images` and `weights`; empty if there is no such list.
+    pub fn range(&self, index: usize) -> std::ops::Range<usize> {
+        match (self.offsets.get(index), self.offsets.get(index + 1)) {
+            (Some(&start), Some(&end)) => start as usize..end as usize,
+            _ => 0..0,
+        }
+    }
+
+    /// Images of list `index`; empty if there is no such list.
+    pub fn images_of(&self, index: usize) -> &[u32] {
+        self.images.get(self.range(index)).unwrap_or_default()
+    }
+
+    /// Weights of list `index`; empty if there are none.
+    pub fn weights_of(&self, index: usize) -> &[f32] {
+        self.weights.get(self.range(index)).unwrap_or_default()
+    }
+
+    /// Appends a list. `weights` has one entry per image, or none in all lists.
+    pub fn push(&mut self, images: &[u32], weights: &[f32]) {
+        if self.offsets.is_empty() {
+            self.offsets.push(0);
+        }
+        self.images.extend_from_slice(images);
+        self.weights.extend_from_slice(weights);
+        self.offsets.push(self.images.len() as u64);
+    }
+}
+
 /// A line segment seen by images.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Line {
@@ -142,15 +251,4 @@ pub struct Line {
     pub end: [f32; 3],
     /// Local image index and confidence.
     pub views: Vec<(u32, f32)>,
-}
-
-/// Oriented bounding box, in the state OpenMVS uses it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Obb {
-    /// Rows are the box axes in the world, row-major 3×3.
-    pub rotation: [f64; 9],
-    /// Box centre in the world.
-    pub center: [f64; 3],
-    /// Half sizes along the axes, all > 0.
-    pub half_extent: [f64; 3],
 }
