@@ -8,5 +8,6 @@ mod error;
 pub mod geometry;
 pub mod progress;
 pub mod scene;
+pub mod store;
 
 pub use error::{Error, Result};

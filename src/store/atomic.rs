@@ -1,0 +1,198 @@
+//! Outputs that appear whole or not at all.
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Bytes gathered before they go to the file.
+const BUFFER: usize = 1 << 20;
+
+/// A file that is written under a temporary name in its folder and takes its name when it is complete.
+///
+/// Dropped without [`AtomicFile::commit`], it leaves nothing behind and what was there before stays. A target that
+/// is neither file nor folder (a pipe, `/dev/stdout`) is written directly.
+#[derive(Debug)]
+pub struct AtomicFile {
+    writer: BufWriter<File>,
+    temporary: Option<tempfile::TempPath>,
+    path: PathBuf,
+}
+
+impl AtomicFile {
+    /// Starts to write `path`; missing folders are created.
+    ///
+    /// # Errors
+    /// [`Error`] if the folder cannot be created or written, or `path` is a folder.
+    pub fn create(path: &Path) -> Result<Self> {
+        if let Ok(metadata) = std::fs::metadata(path) {
+            if metadata.is_dir() {
+                return Err(Error::content(path, "cannot write: a folder has this name; give a file name"));
+            }
+            if !metadata.is_file() {
+                let file = File::options().write(true).open(path).map_err(|e| Error::io(path, "write", e))?;
+                let writer = BufWriter::with_capacity(BUFFER, file);
+                return Ok(AtomicFile { writer, temporary: None, path: path.to_owned() });
+            }
+        }
+        let folder = folder_of(path);
+        create_folder(folder)?;
+        let named =
+            temporary_beside(path, folder).map_err(|e| Error::io(path, "write (its folder refuses)", e))?;
+        let (file, temporary) = named.into_parts();
+        let writer = BufWriter::with_capacity(BUFFER, file);
+        Ok(AtomicFile { writer, temporary: Some(temporary), path: path.to_owned() })
+    }
+
+    /// The final name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Completes the file: flushes it and gives it its name, replacing what had it.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the medium fails; then nothing has changed.
+    pub fn commit(self) -> Result<()> {
+        let AtomicFile { mut writer, temporary, path } = self;
+        writer.flush().map_err(|e| Error::io(&path, "write", e))?;
+        drop(writer);
+        match temporary {
+            Some(temporary) => temporary.persist(&path).map_err(|e| Error::io(&path, "replace", e.error)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.writer.write(bytes)
+    }
+    fn write_all(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.writer.write_all(bytes)
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.writer.seek(to)
+    }
+}
+
+/// Writes `bytes` to `path`, whole or not at all.
+///
+/// # Errors
+/// As [`AtomicFile::create`] and [`AtomicFile::commit`].
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(bytes).map_err(|e| Error::io(path, "write", e))?;
+    file.commit()
+}
+
+/// Checks that `path` can be written, creating missing folders and nothing else; to be called before long work.
+///
+/// # Errors
+/// As [`AtomicFile::create`].
+pub fn check_writable(path: &Path) -> Result<()> {
+    AtomicFile::create(path).map(drop)
+}
+
+/// Creates `folder` and the folders above it where they are missing.
+///
+/// # Errors
+/// [`Error`] if a file is in the way or the system refuses.
+pub fn create_folder(folder: &Path) -> Result<()> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    if let Some(file) = folder.ancestors().find(|a| a.exists() && !a.is_dir()) {
+        let what = format!("cannot create the folder {}: a file is in the way; move it", folder.display());
+        return Err(Error::content(file, what));
+    }
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create folder", e))
+}
+
+/// The folder that holds `path`.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// A new hidden file in `folder`, with the permissions that a plain new file gets.
+fn temporary_beside(path: &Path, folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut prefix = std::ffi::OsString::from(".");
+    prefix.push(path.file_name().unwrap_or_default());
+    prefix.push(".");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(".tmp");
+    #[cfg(unix)]
+    let plain = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+    #[cfg(unix)]
+    builder.permissions(plain);
+    builder.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn commits_whole_files_into_new_folders() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("a/b/c.bin");
+        write_file(&path, b"first").unwrap();
+        write_file(&path, b"second").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"second");
+        assert_eq!(names(path.parent().unwrap()), ["c.bin"]);
+    }
+
+    #[test]
+    fn an_abandoned_file_changes_nothing() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("cloud.ply");
+        write_file(&path, b"before").unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"half of the ne").unwrap();
+        drop(file);
+        check_writable(&path).unwrap();
+        check_writable(&scratch.path().join("other.ply")).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"before");
+        assert_eq!(names(scratch.path()), ["cloud.ply"]);
+    }
+
+    #[test]
+    fn what_is_in_the_way_is_named() {
+        let scratch = tempfile::tempdir().unwrap();
+        let file = scratch.path().join("file");
+        write_file(&file, b"").unwrap();
+        let error = check_writable(&file.join("x/y.ply")).unwrap_err().to_string();
+        assert!(error.contains("a file is in the way") && error.contains("file"), "{error}");
+        let error = check_writable(scratch.path()).unwrap_err().to_string();
+        assert!(error.contains("a folder has this name"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn new_files_get_ordinary_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let scratch = tempfile::tempdir().unwrap();
+        let plain = scratch.path().join("plain");
+        std::fs::write(&plain, b"").unwrap();
+        let ours = scratch.path().join("ours");
+        write_file(&ours, b"").unwrap();
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+}
