@@ -8,6 +8,7 @@ mod error;
 pub mod geometry;
 pub mod progress;
 pub mod scene;
+pub mod semantics;
 pub mod store;
 
 pub use error::{Error, Result};

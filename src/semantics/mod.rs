@@ -1,0 +1,16 @@
+//! What the pixels of an image depict, and what that means for the points made from them.
+//!
+//! Method: Stathopoulou and Remondino, "Multi-view stereo with semantic priors", 2019, Section 4. Nothing here opens
+//! a file: [`crate::store`] reads class tables and label maps.
+
+mod class_file;
+mod classes;
+mod label_map;
+mod names;
+mod policy;
+mod vote;
+
+pub use classes::{Class, ClassId, ClassTable};
+pub use label_map::void_borders;
+pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency};
+pub use vote::{LabelVote, Vote};

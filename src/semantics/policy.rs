@@ -1,0 +1,249 @@
+//! What to do with each class.
+
+use super::{ClassId, ClassTable};
+use crate::Result;
+
+/// How labels restrict which pixels become one point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Consistency {
+    /// Not at all; the point's label is voted.
+    Off,
+    /// A pixel of another class does not support the point and stays free to form its own.
+    #[default]
+    Support,
+    /// As `Support`, and one pixel of another class rejects the point.
+    Strict,
+}
+
+impl Consistency {
+    /// As the command line spells it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Consistency::Off => "off",
+            Consistency::Support => "support",
+            Consistency::Strict => "strict",
+        }
+    }
+}
+
+/// Which classes are wanted and how strictly labels are compared, as the user asked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClassRules {
+    /// Names or ids of the only classes to keep (void only if named); empty = all that the table keeps.
+    pub classes: Vec<String>,
+    /// Names or ids of classes to drop.
+    pub exclude: Vec<String>,
+    /// How labels restrict fusion. Default: [`Consistency::Support`].
+    pub consistency: Consistency,
+    /// Width in depth-map pixels of the band along class borders that counts as void in the check. Default: 0.
+    pub border: u32,
+}
+
+/// Whether two labels may meet in one point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Agreement {
+    /// Equal, or at least one is void, or labels are not compared.
+    Agrees,
+    /// Two different classes.
+    Differs,
+}
+
+/// What to do with each class: one cheap answer per pixel.
+///
+/// The default keeps everything and compares nothing, as if there were no labels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassPolicy {
+    kept: Vec<bool>,
+    estimated: Vec<bool>,
+    others_kept: bool,
+    consistency: Consistency,
+    border: u32,
+}
+
+impl Default for ClassPolicy {
+    fn default() -> Self {
+        ClassPolicy {
+            kept: Vec::new(),
+            estimated: Vec::new(),
+            others_kept: true,
+            consistency: Consistency::Off,
+            border: 0,
+        }
+    }
+}
+
+impl ClassPolicy {
+    /// The policy that `rules` mean for the classes of `table`.
+    ///
+    /// `classes` overrides the table's `keep`; `exclude` drops in either case. Void is kept unless `classes` leaves it
+    /// out or `exclude` names it.
+    ///
+    /// # Errors
+    /// A rule names a class that the table lacks, or nothing would be kept.
+    pub fn new(table: &ClassTable, rules: &ClassRules) -> Result<Self> {
+        let resolve =
+            |names: &[String]| -> Result<Vec<ClassId>> { names.iter().map(|n| table.resolve(n)).collect() };
+        let wanted = resolve(&rules.classes)?;
+        let unwanted = resolve(&rules.exclude)?;
+        let last = table.classes().iter().map(|class| class.id).chain(wanted.iter().copied());
+        let last = last.chain(unwanted.iter().copied()).max().unwrap_or_default();
+        let others_kept = wanted.is_empty();
+        let keeps = |id: ClassId| {
+            let named = if others_kept { table.get(id).is_none_or(|c| c.keep) } else { wanted.contains(&id) };
+            named && !unwanted.contains(&id)
+        };
+        let ids = || (0..=last.0).map(ClassId);
+        let kept: Vec<bool> = ids().map(keeps).collect();
+        let estimated =
+            ids().map(|id| table.get(id).and_then(|c| c.estimate).unwrap_or(kept[usize::from(id.0)]));
+        let estimated = estimated.collect();
+        let listed = ids().any(|id| table.contains(id) && kept[usize::from(id.0)]);
+        if !listed && !others_kept {
+            return Err(crate::Error::invalid(
+                "no class is kept: --classes and --exclude-classes cancel out",
+            ));
+        }
+        Ok(ClassPolicy { kept, estimated, others_kept, consistency: rules.consistency, border: rules.border })
+    }
+
+    /// Whether a pixel of this class may start a point.
+    #[inline]
+    pub fn is_candidate(&self, id: impl Into<ClassId>) -> bool {
+        self.is_kept(id)
+    }
+
+    /// Whether a point of this class belongs in the cloud.
+    #[inline]
+    pub fn is_kept(&self, id: impl Into<ClassId>) -> bool {
+        self.kept.get(usize::from(id.into().0)).copied().unwrap_or(self.others_kept)
+    }
+
+    /// Whether depths of pixels of this class are worth estimating.
+    #[inline]
+    pub fn is_estimated(&self, id: impl Into<ClassId>) -> bool {
+        self.estimated.get(usize::from(id.into().0)).copied().unwrap_or(self.others_kept)
+    }
+
+    /// Whether two pixels may be one point as far as their labels go; always with [`Consistency::Off`].
+    ///
+    /// Give it labels whose borders are void already, see [`super::void_borders`].
+    #[inline]
+    pub fn agreement(&self, reference: impl Into<ClassId>, neighbor: impl Into<ClassId>) -> Agreement {
+        let (a, b) = (reference.into(), neighbor.into());
+        if self.consistency == Consistency::Off || a == b || a.is_void() || b.is_void() {
+            Agreement::Agrees
+        } else {
+            Agreement::Differs
+        }
+    }
+
+    /// How labels restrict fusion.
+    pub fn consistency(&self) -> Consistency {
+        self.consistency
+    }
+
+    /// Width in depth-map pixels of the band along class borders that counts as void in the check.
+    pub fn border(&self) -> u32 {
+        self.border
+    }
+
+    /// Whether no class is dropped: then labels cannot remove a pixel by themselves.
+    pub fn keeps_everything(&self) -> bool {
+        self.others_kept && self.kept.iter().all(|&kept| kept)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn policy(table: &str, classes: &[&str], exclude: &[&str]) -> Result<ClassPolicy> {
+        let rules = ClassRules {
+            classes: classes.iter().map(|s| s.to_string()).collect(),
+            exclude: exclude.iter().map(|s| s.to_string()).collect(),
+            ..ClassRules::default()
+        };
+        ClassPolicy::new(&ClassTable::builtin(table)?, &rules)
+    }
+
+    fn kept(policy: &ClassPolicy, ids: std::ops::RangeInclusive<u16>) -> Vec<u16> {
+        ids.filter(|&id| policy.is_kept(id)).collect()
+    }
+
+    #[test]
+    fn without_rules_everything_is_kept_and_estimated() {
+        for policy in [ClassPolicy::default(), policy("3dom-facade", &[], &[]).unwrap()] {
+            assert!(
+                (0..=u16::MAX)
+                    .all(|id| policy.is_kept(id) && policy.is_candidate(id) && policy.is_estimated(id))
+            );
+            assert!(policy.keeps_everything());
+        }
+    }
+
+    #[test]
+    fn classes_keep_only_what_they_name() {
+        let policy = policy("3dom-facade", &["Building", "5"], &[]).unwrap();
+        assert_eq!(kept(&policy, 0..=u16::MAX), [1, 5]);
+        assert!(!policy.keeps_everything());
+        assert!(!policy.is_estimated(0) && policy.is_estimated(1) && !policy.is_estimated(60_000));
+    }
+
+    #[test]
+    fn void_is_kept_by_name_only_among_classes_and_dropped_by_name_only_among_excluded() {
+        assert_eq!(kept(&policy("3dom-facade", &["void", "sky"], &[]).unwrap(), 0..=5), [0, 2]);
+        assert_eq!(kept(&policy("3dom-facade", &[], &["sky", "obstacle"]).unwrap(), 0..=5), [0, 1, 4, 5]);
+        assert_eq!(kept(&policy("3dom-facade", &[], &["void"]).unwrap(), 0..=5), [1, 2, 3, 4, 5]);
+        assert_eq!(kept(&policy("openmvs-aerial", &["unclassified", "tree"], &[]).unwrap(), 0..=8), [0, 5]);
+    }
+
+    #[test]
+    fn exclusion_wins_over_inclusion_and_nothing_left_is_an_error() {
+        assert_eq!(kept(&policy("3dom-facade", &["sky", "door"], &["sky"]).unwrap(), 0..=5), [5]);
+        let error = policy("3dom-facade", &["sky"], &["sky"]).unwrap_err().to_string();
+        assert!(error.contains("no class is kept"), "{error}");
+    }
+
+    #[test]
+    fn the_table_decides_where_the_user_does_not() {
+        let text = "[[class]]\nid = 1\nname = \"wall\"\n[[class]]\nid = 2\nname = \"sky\"\nkeep = false\n\
+                    [[class]]\nid = 3\nname = \"tree\"\nkeep = false\nestimate = true\n\
+                    [[class]]\nid = 4\nname = \"glass\"\nestimate = false\n";
+        let table = ClassTable::from_toml(text, std::path::Path::new("t.toml")).unwrap();
+        let policy = ClassPolicy::new(&table, &ClassRules::default()).unwrap();
+        assert_eq!(kept(&policy, 0..=4), [0, 1, 4]);
+        let estimated: Vec<u16> = (0..=4).filter(|&id| policy.is_estimated(id)).collect();
+        assert_eq!(estimated, [0, 1, 3]);
+        let rules = ClassRules { classes: vec!["sky".into()], ..ClassRules::default() };
+        let policy = ClassPolicy::new(&table, &rules).unwrap();
+        assert_eq!(kept(&policy, 0..=4), [2]);
+        assert!(policy.is_estimated(2) && policy.is_estimated(3) && !policy.is_estimated(1));
+    }
+
+    #[test]
+    fn the_ids_table_takes_numbers_it_has_not_met() {
+        let policy = policy("ids", &["class-7", "300"], &[]).unwrap();
+        assert_eq!(kept(&policy, 0..=u16::MAX), [7, 300]);
+    }
+
+    #[test]
+    fn an_unknown_class_is_an_error_with_the_nearest_name() {
+        let error = policy("3dom-facade", &["widnow"], &[]).unwrap_err().to_string();
+        assert_eq!(error, "class table 3dom-facade has no class \"widnow\"; did you mean \"window\"?");
+        let error = policy("cityscapes", &[], &["lamp post"]).unwrap_err().to_string();
+        assert!(error.contains("road, sidewalk") && !error.contains("did you mean"), "{error}");
+        let error = policy("3dom-facade", &["6"], &[]).unwrap_err().to_string();
+        assert!(error.contains("no class \"6\""), "{error}");
+    }
+
+    #[test]
+    fn void_agrees_with_all_and_classes_only_with_themselves() {
+        let mut policy = ClassPolicy { consistency: Consistency::Support, ..ClassPolicy::default() };
+        assert_eq!(policy.agreement(1, 1), Agreement::Agrees);
+        assert_eq!(policy.agreement(0, 1), Agreement::Agrees);
+        assert_eq!(policy.agreement(2, 0), Agreement::Agrees);
+        assert_eq!(policy.agreement(2, 1), Agreement::Differs);
+        policy.consistency = Consistency::Off;
+        assert_eq!(policy.agreement(2, 1), Agreement::Agrees);
+    }
+}
