@@ -1,0 +1,295 @@
+//! Finding and reading the label maps of a scene's views.
+
+use super::byte_cache::ByteCache;
+use super::label_png::{LabelReader, UnknownLabel};
+use crate::error::{Error, Result};
+use crate::geometry::Size;
+use crate::scene::{Grid, LabelMap, ViewIndex, resize_nearest};
+use crate::semantics::{ClassId, ClassTable};
+use rayon::prelude::*;
+use semvs_formats::Limits;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What to do with a view that has no label map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MissingLabels {
+    /// Stop before any work.
+    #[default]
+    Refuse,
+    /// All its pixels are void; a warning says so.
+    Void,
+}
+
+/// Where label maps come from, as the user asked. Labels take part only if one of the first two is given.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LabelSources {
+    /// Folder of label maps. Default: none, then the scene's mask entries and the images' folders are searched.
+    pub label_path: Option<PathBuf>,
+    /// Built-in table or file (TOML, or JSON like `labels.json`). Default: `labels.json` in `label_path`, else `ids`.
+    pub class_table: Option<String>,
+    /// What an id or colour means that the class table lacks. Default: an error.
+    pub unknown: UnknownLabel,
+    /// What a view without label map means. Default: an error.
+    pub missing: MissingLabels,
+}
+
+impl LabelSources {
+    /// Whether labels take part at all.
+    pub fn are_given(&self) -> bool {
+        self.label_path.is_some() || self.class_table.is_some()
+    }
+}
+
+/// A view whose label map is wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelRequest {
+    /// The view.
+    pub view: ViewIndex,
+    /// Its photograph.
+    pub image: PathBuf,
+    /// The mask that the scene names for it.
+    pub mask: Option<PathBuf>,
+    /// Size of the photograph, if known: the label map must have its aspect ratio.
+    pub size: Option<Size>,
+}
+
+/// The label maps of a scene's views, found and checked.
+#[derive(Debug)]
+pub struct LabelStore {
+    reader: LabelReader,
+    files: HashMap<ViewIndex, PathBuf>,
+    counts: BTreeMap<ViewIndex, BTreeMap<ClassId, u64>>,
+    cache: ByteCache<(ViewIndex, Size), LabelMap>,
+}
+
+/// Bytes of label maps that a [`LabelStore`] keeps for the next use.
+const CACHE_BYTES: usize = 256 << 20;
+
+/// Most files that one message names.
+const MOST_NAMED: usize = 3;
+
+impl LabelStore {
+    /// Finds the label map of every view and reads each once, in parallel, so that whatever is wrong with any of them
+    /// shows before long work starts.
+    ///
+    /// # Errors
+    /// The class table cannot be used; a view has no label map (the message lists the names tried) or none has; a map
+    /// is unreadable, of another aspect ratio than its image, or holds an id or colour that the table lacks. With
+    /// several faulty maps the message is about the first and names others.
+    pub fn open(sources: &LabelSources, views: &[LabelRequest], limits: Limits) -> Result<Self> {
+        if let Some(folder) = sources.label_path.as_deref().filter(|folder| !folder.is_dir()) {
+            return Err(Error::content(folder, "no such folder of label maps (--label-path)"));
+        }
+        let (table, table_is_assumed) = class_table(sources, limits)?;
+        let colors = table.colors();
+        let reader = LabelReader { table, colors, table_is_assumed, unknown: sources.unknown, limits };
+        let files = find_all(sources, views)?;
+        let scanned: Vec<Result<_>> = views
+            .par_iter()
+            .filter_map(|request| files.get(&request.view).map(|path| (request, path)))
+            .map(|(request, path)| {
+                let labels = reader.read(path, |size| check_aspect(path, size, request))?;
+                Ok((request.view, count_classes(&labels)))
+            })
+            .collect();
+        let counts: BTreeMap<ViewIndex, BTreeMap<ClassId, u64>> =
+            first_error_of_all(scanned)?.into_iter().collect();
+        let met = counts.values().flat_map(|counts| counts.keys().copied());
+        let table = reader.table.with_ids(met);
+        let reader = LabelReader { table, ..reader };
+        Ok(LabelStore { reader, files, counts, cache: ByteCache::new(CACHE_BYTES) })
+    }
+
+    /// The classes; for table `ids` those that were met.
+    pub fn table(&self) -> &ClassTable {
+        &self.reader.table
+    }
+
+    /// The file of a view's label map; `None`: the view is all void.
+    pub fn file(&self, view: ViewIndex) -> Option<&Path> {
+        self.files.get(&view).map(PathBuf::as_path)
+    }
+
+    /// Pixels of each class in a view's label map, at the map's own size.
+    pub fn pixel_counts(&self, view: ViewIndex) -> Option<&BTreeMap<ClassId, u64>> {
+        self.counts.get(&view)
+    }
+
+    /// The labels of a view's pixels at `size`, by the nearest pixel; all void for a view without map.
+    ///
+    /// # Errors
+    /// The file has changed for the worse since [`LabelStore::open`].
+    pub fn load(&self, view: ViewIndex, size: Size) -> Result<Arc<LabelMap>> {
+        let Some(path) = self.files.get(&view) else {
+            return Ok(Arc::new(Grid::filled(size, ClassId::VOID.0)));
+        };
+        self.cache.get_or_load((view, size), || {
+            let labels = resize_nearest(&self.reader.read(path, |_| Ok(()))?, size);
+            let bytes = std::mem::size_of_val(labels.data());
+            Ok((labels, bytes))
+        })
+    }
+}
+
+/// Pixels of each class.
+pub fn count_classes(labels: &LabelMap) -> BTreeMap<ClassId, u64> {
+    let mut counts: BTreeMap<ClassId, u64> = BTreeMap::new();
+    for run in labels.data().chunk_by(|a, b| a == b) {
+        *counts.entry(ClassId(run[0])).or_default() += run.len() as u64;
+    }
+    counts
+}
+
+/// The class table that the sources name, and whether it is only assumed.
+fn class_table(sources: &LabelSources, limits: Limits) -> Result<(ClassTable, bool)> {
+    let Some(name) = &sources.class_table else {
+        let json = sources.label_path.as_ref().map(|folder| folder.join("labels.json"));
+        return match json.filter(|path| path.is_file()) {
+            Some(path) => Ok((ClassTable::from_labels_json(&read_text(&path, limits)?, &path)?, false)),
+            None => Ok((ClassTable::ids(), true)),
+        };
+    };
+    let path = Path::new(name);
+    if ClassTable::builtin_names().any(|builtin| builtin == name) || !path.is_file() {
+        return Ok((ClassTable::builtin(name)?, false));
+    }
+    let text = read_text(path, limits)?;
+    let is_json = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
+    let table = match is_json {
+        true => ClassTable::from_labels_json(&text, path)?,
+        false => ClassTable::from_toml(&text, path)?,
+    };
+    Ok((table, false))
+}
+
+/// A class table of 65535 classes is smaller.
+const MAX_TABLE_BYTES: u64 = 64 << 20;
+
+fn read_text(path: &Path, limits: Limits) -> Result<String> {
+    let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "open", e))?.len();
+    let most = limits.max_bytes.min(MAX_TABLE_BYTES);
+    if bytes > most {
+        return Err(Error::content(path, format!("{bytes} bytes are too many for a class table")));
+    }
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    String::from_utf8(bytes)
+        .map_err(|e| Error::content(path, format!("a class table is UTF-8 text: {}", e.utf8_error())))
+}
+
+/// The names under which the label map of `request` is looked for, in order.
+pub fn candidate_files(label_path: Option<&Path>, request: &LabelRequest) -> Vec<PathBuf> {
+    let file = request.image.file_name().unwrap_or_default().to_string_lossy();
+    let stem = request.image.file_stem().unwrap_or_default().to_string_lossy();
+    let mut candidates = Vec::new();
+    if let Some(folder) = label_path {
+        let names = [
+            format!("{stem}.png"),
+            format!("{file}.png"),
+            format!("{stem}_l.png"),
+            format!("{stem}.label.png"),
+            format!("{stem}.mask.png"),
+        ];
+        candidates.extend(names.map(|name| folder.join(name)));
+    }
+    candidates.extend(request.mask.clone());
+    candidates.push(request.image.with_file_name(format!("{stem}.mask.png")));
+    candidates
+}
+
+/// The label map of every view that has one.
+fn find_all(sources: &LabelSources, views: &[LabelRequest]) -> Result<HashMap<ViewIndex, PathBuf>> {
+    let mut files = HashMap::new();
+    let mut without = Vec::new();
+    for request in views {
+        let candidates = candidate_files(sources.label_path.as_deref(), request);
+        // A photograph in the folder of label maps is no label map.
+        let found = candidates.into_iter().find(|path| path.is_file() && !is_same_file(path, &request.image));
+        match found {
+            Some(path) => drop(files.insert(request.view, path)),
+            None => without.push(request),
+        }
+    }
+    let Some(first) = without.first() else { return Ok(files) };
+    if sources.missing == MissingLabels::Refuse || files.is_empty() {
+        let tried = candidate_files(sources.label_path.as_deref(), first);
+        let tried: Vec<String> = tried.iter().map(|path| path.display().to_string()).collect();
+        let which = match without.len() {
+            n if n == views.len() && n > 1 => "no image has a label map".to_owned(),
+            1 => format!("no label map for {}", first.image.display()),
+            n => {
+                format!("no label map for {} of {} images, such as {}", n, views.len(), first.image.display())
+            }
+        };
+        let remedy =
+            if files.is_empty() { "" } else { "; --missing-labels void takes such images as unlabelled" };
+        return Err(Error::invalid(format!(
+            "{which}; for {} these were tried: {}{remedy}",
+            first.image.display(),
+            tried.join(", ")
+        )));
+    }
+    for request in without {
+        tracing::warn!("{}: no label map, all its pixels are void", request.image.display());
+    }
+    Ok(files)
+}
+
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Whether a label map of `size` has its image's aspect ratio: the larger of the two, scaled to the smaller one's
+/// width or height, must fit it to a pixel.
+fn check_aspect(path: &Path, size: Size, request: &LabelRequest) -> Result<()> {
+    let Some(image) = request.size else { return Ok(()) };
+    let (small, large) = if size.area() <= image.area() { (size, image) } else { (image, size) };
+    let [sw, sh, lw, lh] = [small.width, small.height, large.width, large.height].map(f64::from);
+    let fits = (sh - lh * sw / lw).abs() <= 1.0 || (sw - lw * sh / lh).abs() <= 1.0;
+    if fits {
+        return Ok(());
+    }
+    let what = format!(
+        "the label map has {size} pixels, its image {} has {image}: they must have the same shape, pixel for pixel or scaled",
+        request.image.display()
+    );
+    Err(Error::content(path, what))
+}
+
+/// All values, or the first error with the number of the others.
+fn first_error_of_all<T>(results: Vec<Result<T>>) -> Result<Vec<T>> {
+    let mut values = Vec::new();
+    let mut errors = Vec::new();
+    for result in results {
+        match result {
+            Ok(value) => values.push(value),
+            Err(error) => errors.push(error),
+        }
+    }
+    let others: Vec<String> = errors.iter().skip(1).map(place).collect();
+    let named = others.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let more = match others.len().saturating_sub(MOST_NAMED) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    match errors.into_iter().next() {
+        None => Ok(values),
+        Some(error) if others.is_empty() => Err(error),
+        Some(error) => Err(Error::invalid(format!("{error} (faulty as well: {named}{more})"))),
+    }
+}
+
+/// The file that an error is about.
+fn place(error: &Error) -> String {
+    match error {
+        Error::Io { path, .. } | Error::Format { path, .. } | Error::Content { path, .. } => {
+            path.display().to_string()
+        }
+        error => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+#[path = "labels_tests.rs"]
+mod tests;
