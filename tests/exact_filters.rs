@@ -2,7 +2,7 @@
 
 mod openmvs_maps;
 
-use openmvs_maps::{depth_maps, facade6, neighbor_lists};
+use openmvs_maps::{depth_maps, facade6, neighbor_lists, scene};
 use semvs::depth_filter::{DepthFilterOptions, FilterView, fill_gaps, filter_consistency, remove_speckles};
 use semvs::scene::DepthEstimate;
 
@@ -23,7 +23,7 @@ fn speckles_and_gaps(maps: &mut [DepthEstimate]) {
 }
 
 fn adjusted(maps: &[DepthEstimate]) -> Vec<DepthEstimate> {
-    let lists = neighbor_lists(&facade6().join("openmvs-2.3.0/post7/scene_dense.mvs"));
+    let lists = neighbor_lists(&scene(&facade6().join("openmvs-2.3.0/post7/scene_dense.mvs")));
     assert_eq!(lists.len(), maps.len());
     let options = DepthFilterOptions::default();
     maps.iter()

@@ -90,6 +90,19 @@ impl PointCloud {
         PointCloud { layout, ..PointCloud::default() }
     }
 
+    /// Drops all points but keeps their memory; the next ones carry what `layout` says.
+    pub fn reset(&mut self, layout: CloudLayout) {
+        self.layout = layout;
+        self.positions.clear();
+        self.normals.clear();
+        self.colors.clear();
+        self.view_offsets.clear();
+        self.views.clear();
+        self.weights.clear();
+        self.confidences.clear();
+        self.labels.clear();
+    }
+
     /// Point `i`.
     pub fn point(&self, i: usize) -> CloudPoint<'_> {
         let start = if i == 0 { 0 } else { self.view_offsets[i - 1] };

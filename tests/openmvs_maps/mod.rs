@@ -1,10 +1,17 @@
-//! OpenMVS's own maps and neighbour lists, for the tests of the stages that must reproduce it.
+//! OpenMVS's own maps, neighbour lists and clouds, for the tests of the stages that must reproduce it.
 #![allow(dead_code)]
 
 use nalgebra::{Matrix3, Vector3};
-use semvs::geometry::{Camera, Size};
-use semvs::scene::{DepthEstimate, Grid, ImageId, ViewIndex};
+use semvs::Result;
+use semvs::fusion::{FusionMaps, FusionView, MapInfo, MapSource};
+use semvs::geometry::{Camera, Roi, Size};
+use semvs::scene::{DepthEstimate, Grid, ImageId, ResolutionOptions, ViewIndex};
+use semvs::store::images::load_working_color;
+use semvs_formats::dmap::DepthMapFile;
+use semvs_formats::mvs::{self, Scene};
+use semvs_formats::{Limits, ply};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The bundled scene.
 pub(crate) fn facade6() -> PathBuf {
@@ -14,7 +21,6 @@ pub(crate) fn facade6() -> PathBuf {
 /// A folder of reference data that is not bundled, if it is there.
 pub(crate) fn shared(relative: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(relative);
-    let path = if path.exists() { path } else { Path::new("/work/shared").join(relative) };
     let found = path.exists();
     println!("{relative}: {}", if found { "compared" } else { "not there, skipped" });
     found.then_some(path)
@@ -31,75 +37,91 @@ pub(crate) fn depth_maps(folder: &Path) -> Vec<DepthEstimate> {
     (0..)
         .map(|i| folder.join(format!("depth{i:04}.dmap.zst")))
         .take_while(|path| path.exists())
-        .map(|path| parse_dmap(&bytes(&path)))
+        .map(|path| estimate(DepthMapFile::from_bytes(&bytes(&path), &Limits::default()).unwrap()))
         .collect()
 }
 
-fn parse_dmap(b: &[u8]) -> DepthEstimate {
-    let u32_at = |o: usize| u32::from_le_bytes(b[o..o + 4].try_into().unwrap());
-    let f32_at = |o: usize| f32::from_le_bytes(b[o..o + 4].try_into().unwrap());
-    let f64_at = |o: usize| f64::from_le_bytes(b[o..o + 8].try_into().unwrap());
-    assert_eq!((&b[..2], b[2] & 7), (&b"DR"[..], 7));
-    let size = Size::new(u32_at(12), u32_at(16));
-    let name_len = usize::from(u16::from_le_bytes([b[28], b[29]]));
-    let mut o = 30 + name_len;
-    let ids: Vec<_> = (0..u32_at(o) as usize).map(|i| ImageId(u32_at(o + 4 + 4 * i))).collect();
-    o += 4 + 4 * ids.len();
-    let k = Matrix3::from_row_iterator((0..9).map(|i| f64_at(o + 8 * i)));
-    let r = Matrix3::from_row_iterator((0..9).map(|i| f64_at(o + 72 + 8 * i)));
-    let c = Vector3::from_iterator((0..3).map(|i| f64_at(o + 144 + 8 * i)));
-    o += 168;
-    let mut floats = |n: usize| {
-        let v: Vec<f32> = (0..n).map(|i| f32_at(o + 4 * i)).collect();
-        o += 4 * n;
-        v
-    };
-    let n = size.area();
-    let depth = Grid::from_vec(size, floats(n)).unwrap();
-    let normal = floats(3 * n).chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect();
+fn estimate(file: DepthMapFile) -> DepthEstimate {
+    let size = Size::new(file.width, file.height);
+    assert_eq!((file.image_width, file.image_height), (file.width, file.height));
     DepthEstimate {
-        image_id: ids[0],
-        image_name: String::from_utf8(b[30..30 + name_len].to_vec()).unwrap(),
-        source_ids: ids[1..].to_vec(),
-        camera: Camera::new(Size::new(u32_at(4), u32_at(8)), k, r, c),
-        depth_range: (f32_at(20), f32_at(24)),
-        depth,
-        normal: Some(Grid::from_vec(size, normal).unwrap()),
-        confidence: Some(Grid::from_vec(size, floats(n)).unwrap()),
+        image_id: ImageId(file.ids[0]),
+        image_name: String::from_utf8(file.image_name).unwrap(),
+        source_ids: file.ids[1..].iter().map(|&id| ImageId(id)).collect(),
+        camera: Camera::new(
+            size,
+            Matrix3::from_row_slice(&file.k),
+            Matrix3::from_row_slice(&file.rotation),
+            Vector3::from(file.center),
+        ),
+        depth_range: (file.depth_min, file.depth_max),
+        depth: Grid::from_vec(size, file.depth).unwrap(),
+        normal: Grid::from_vec(size, file.normal),
+        confidence: Grid::from_vec(size, file.confidence),
     }
 }
 
-/// The neighbour lists, best first, of an MVSI version 7 scene; lists are empty where none is stored.
-pub(crate) fn neighbor_lists(scene: &Path) -> Vec<Vec<ViewIndex>> {
-    let b = bytes(scene);
-    assert_eq!(&b[..8], b"MVSI\x07\0\0\0");
-    let mut at = 12;
-    let u64_at = |o: usize| u64::from_le_bytes(b[o..o + 8].try_into().unwrap()) as usize;
-    let skip_string = |at: &mut usize| *at += 8 + u64_at(*at);
-    let count = |at: &mut usize| {
-        *at += 8;
-        u64_at(*at - 8)
-    };
-    for _ in 0..count(&mut at) {
-        skip_string(&mut at);
-        for _ in 0..count(&mut at) {
-            skip_string(&mut at);
-            skip_string(&mut at);
-            at += 8 + 168;
-        }
-        at += count(&mut at) * 96;
+/// A scene file.
+pub(crate) fn scene(path: &Path) -> Scene {
+    mvs::read(path, &Limits::default()).unwrap()
+}
+
+/// The neighbour lists of a scene, best first. None of the scenes here has more than the filters and fusion retain.
+pub(crate) fn neighbor_lists(scene: &Scene) -> Vec<Vec<ViewIndex>> {
+    scene.images.iter().map(|image| image.view_scores.iter().map(|s| ViewIndex(s.image)).collect()).collect()
+}
+
+/// The region of interest of a scene.
+pub(crate) fn roi(scene: &Scene) -> Option<Roi> {
+    scene.obb.map(|obb| Roi {
+        rotation: Matrix3::from_row_slice(&obb.rotation),
+        center: Vector3::from(obb.center),
+        half_extent: Vector3::from(obb.half_extent),
+    })
+}
+
+/// A cloud.
+pub(crate) fn cloud(path: &Path) -> ply::Cloud {
+    ply::read_cloud(&bytes(path)[..], &Limits::default()).unwrap()
+}
+
+/// Maps of all views in memory.
+pub(crate) struct MapsInMemory {
+    pub(crate) maps: Vec<FusionMaps>,
+    pub(crate) views: Vec<FusionView>,
+}
+
+impl MapsInMemory {
+    /// The maps of `map_folder` with the images of `image_folder` and the neighbours of `scene`.
+    pub(crate) fn load(
+        map_folder: &Path,
+        image_folder: &Path,
+        scene: &Scene,
+        resolution: ResolutionOptions,
+    ) -> Self {
+        let maps: Vec<FusionMaps> = depth_maps(map_folder)
+            .into_iter()
+            .map(|estimate| {
+                let color =
+                    load_working_color(&image_folder.join(&estimate.image_name), &resolution).unwrap();
+                FusionMaps { color: Some(Arc::new(color)), ..FusionMaps::new(Arc::new(estimate)) }
+            })
+            .collect();
+        let views = neighbor_lists(scene)
+            .into_iter()
+            .zip(&maps)
+            .map(|(neighbors, maps)| FusionView {
+                maps: Some(MapInfo::of(maps)),
+                neighbor_count: neighbors.len(),
+                neighbors,
+            })
+            .collect();
+        MapsInMemory { maps, views }
     }
-    (0..count(&mut at))
-        .map(|_| {
-            skip_string(&mut at);
-            skip_string(&mut at);
-            at += 28;
-            (0..count(&mut at))
-                .map(|_| {
-                    at += 24;
-                    ViewIndex(u32::from_le_bytes(b[at - 24..at - 20].try_into().unwrap()))
-                })
-                .collect()
-        })
-        .collect()
+}
+
+impl MapSource for MapsInMemory {
+    fn load(&self, view: ViewIndex) -> Result<FusionMaps> {
+        Ok(self.maps[view.index()].clone())
+    }
 }

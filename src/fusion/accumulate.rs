@@ -1,0 +1,118 @@
+//! Third pass: position, colour, normal and weights of the points that were decided on. Rows are independent.
+
+use super::color::nearest_view_color;
+use super::correspond::{Participant, RowMatches};
+use super::merge::{Claim, Member, RowClaims};
+use super::options::AttributeSource;
+use crate::error::Result;
+use crate::scene::{CloudPoint, PointCloud, PointSink, ViewIndex};
+
+/// Weighted sums over the pixels of a point, and its views in ascending order.
+#[derive(Default)]
+pub(super) struct Accumulator {
+    position: [f64; 3],
+    color: [f32; 3],
+    normal: [f32; 3],
+    weight: f64,
+    views: Vec<ViewIndex>,
+    weights: Vec<f32>,
+}
+
+impl Accumulator {
+    /// Appends the points of row `y` to `out`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub(super) fn emit_row(
+        &mut self,
+        views: &[Participant<'_>],
+        y: u32,
+        row: &RowMatches,
+        claims: &RowClaims,
+        colors: AttributeSource,
+        out: &mut PointCloud,
+    ) -> Result<()> {
+        let mut start = 0;
+        for claim in &claims.claims {
+            let members = &claims.members[start..claim.members_end];
+            start = claim.members_end;
+            let own = (y * views[0].width + row.columns[claim.column]) as usize;
+            self.seed(&views[0], own, row.points[claim.column]);
+            for member in members {
+                self.add(&views[member.view as usize], member.pixel);
+            }
+            out.push(&self.point(views, members, claim, colors))?;
+        }
+        Ok(())
+    }
+
+    fn seed(&mut self, view: &Participant<'_>, pixel: usize, point: [f32; 3]) {
+        let weight = view.weight(pixel);
+        self.position = point.map(|v| f64::from(v * weight));
+        self.color = view.color.map_or([0.0; 3], |c| c[pixel].map(|v| f32::from(v) * weight));
+        self.normal = view.normal_in_world(pixel).map(|v| v * weight);
+        self.weight = f64::from(weight);
+        self.views.clear();
+        self.weights.clear();
+        self.views.push(view.view);
+        self.weights.push(weight);
+    }
+
+    fn add(&mut self, view: &Participant<'_>, pixel: u32) {
+        let i = pixel as usize;
+        let weight = view.weight(i);
+        let point = view.lens.world_point(pixel % view.width, pixel / view.width, view.depth[i]);
+        let normal = view.normal_in_world(i);
+        for axis in 0..3 {
+            self.position[axis] += point[axis] * f64::from(weight);
+            self.normal[axis] += normal[axis] * weight;
+        }
+        if let Some(color) = view.color {
+            for channel in 0..3 {
+                self.color[channel] += f32::from(color[i][channel]) * weight;
+            }
+        }
+        self.weight += f64::from(weight);
+        let at = self.views.partition_point(|&v| v < view.view);
+        self.views.insert(at, view.view);
+        self.weights.insert(at, weight);
+    }
+
+    fn point(
+        &self,
+        views: &[Participant<'_>],
+        members: &[Member],
+        claim: &Claim,
+        colors: AttributeSource,
+    ) -> CloudPoint<'_> {
+        let inverse = 1.0 / self.weight;
+        let position = self.position.map(|v| (v * inverse) as f32);
+        let inverse = inverse as f32;
+        let color = match colors {
+            AttributeSource::None => [0; 3],
+            AttributeSource::DuringFusion => self.color.map(|v| (v * inverse + 0.5).floor() as u8),
+            AttributeSource::AfterFusion => {
+                let mut seeing: Vec<_> = members.iter().map(|m| &views[m.view as usize]).collect();
+                seeing.push(&views[0]);
+                seeing.sort_unstable_by_key(|view| view.view);
+                nearest_view_color(position, &seeing)
+            }
+        };
+        CloudPoint {
+            position,
+            normal: normalized(self.normal.map(|v| v * inverse)),
+            color,
+            views: &self.views,
+            weights: &self.weights,
+            confidence: 0.0,
+            label: claim.label.label.0,
+            label_confidence: claim.label.confidence,
+        }
+    }
+}
+
+/// `v` at length 1, zero if it is zero.
+fn normalized(v: [f32; 3]) -> [f32; 3] {
+    let norm = v.iter().map(|&c| f64::from(c) * f64::from(c)).sum::<f64>().sqrt();
+    if norm > 0.0 { v.map(|c| (f64::from(c) * (1.0 / norm)) as f32) } else { v }
+}

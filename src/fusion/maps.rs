@@ -1,0 +1,83 @@
+//! What fusion reads of one view.
+
+use crate::error::{Error, Result};
+use crate::geometry::Size;
+use crate::scene::{ColorImage, DepthEstimate, Grid, LabelMap, ViewIndex};
+use std::sync::Arc;
+
+/// The maps of one view, all of one size; immutable and shared.
+#[derive(Clone, Debug)]
+pub struct FusionMaps {
+    /// Depth, normals, confidence, and the camera at the size of the maps.
+    pub estimate: Arc<DepthEstimate>,
+    /// Colour of every pixel, if points get colours.
+    pub color: Option<Arc<ColorImage>>,
+    /// Class of every pixel; a view without one is void everywhere.
+    pub labels: Option<Arc<LabelMap>>,
+    /// Classes as the consistency check sees them, where they differ from `labels`: bands along class borders
+    /// are void here. Votes are always taken from `labels`.
+    pub checked_labels: Option<Arc<LabelMap>>,
+}
+
+impl FusionMaps {
+    /// Maps without colour and labels.
+    pub fn new(estimate: Arc<DepthEstimate>) -> Self {
+        FusionMaps { estimate, color: None, labels: None, checked_labels: None }
+    }
+
+    /// Bytes that the maps hold in memory.
+    pub fn bytes(&self) -> u64 {
+        let size = self.size();
+        let has = |map: bool, bytes: u64| if map { bytes } else { 0 };
+        size.area() as u64
+            * (4 + has(self.estimate.normal.is_some(), 12)
+                + has(self.estimate.confidence.is_some(), 4)
+                + has(self.color.is_some(), 3)
+                + has(self.labels.is_some(), 2)
+                + has(self.checked_labels.is_some(), 2))
+    }
+
+    /// Size of the maps.
+    pub fn size(&self) -> Size {
+        self.estimate.depth.size()
+    }
+
+    /// Refuses maps of different sizes.
+    pub(super) fn check(&self, view: ViewIndex) -> Result<()> {
+        let size = self.size();
+        let differs = |what: &str, other: Size| {
+            Err(Error::invalid(format!(
+                "view {} ({}): the depth map is {size}, its {what} {other}; estimate the depth map again or scale \
+                 the {what} to it",
+                view.0, self.estimate.image_name
+            )))
+        };
+        fn size_of<T>(map: Option<&Grid<T>>) -> Option<Size> {
+            map.map(Grid::size)
+        }
+        let sizes = [
+            ("normal map", size_of(self.estimate.normal.as_ref())),
+            ("confidence map", size_of(self.estimate.confidence.as_ref())),
+            ("image", size_of(self.color.as_deref())),
+            ("label map", size_of(self.labels.as_deref())),
+            ("label map", size_of(self.checked_labels.as_deref())),
+            ("camera", Some(self.estimate.camera.size())),
+        ];
+        for (what, other) in sizes {
+            match other {
+                Some(other) if other != size => return differs(what, other),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Gives fusion the maps of a view when it needs them; the same view may be asked for several times.
+pub trait MapSource: Sync {
+    /// The maps of `view`, of the size and with the normals that its [`super::MapInfo`] announced.
+    ///
+    /// # Errors
+    /// Whatever keeps the maps from being read.
+    fn load(&self, view: ViewIndex) -> Result<FusionMaps>;
+}

@@ -1,0 +1,148 @@
+//! Second pass: decides in raster order which pixels become points, and claims them. This is the only part of a
+//! view's turn that depends on what came before.
+
+use super::correspond::{Participant, Relation, RowMatches};
+use super::state::FreePixels;
+use super::summary::Tally;
+use crate::semantics::{ClassPolicy, Consistency, LabelVote, Vote};
+
+/// A pixel of the step's `view`-th participant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Member {
+    pub(super) view: u32,
+    pub(super) pixel: u32,
+}
+
+/// A point that has been decided on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Claim {
+    /// Position among the row's columns.
+    pub(super) column: usize,
+    /// End of its part of [`RowClaims::members`], which starts where the previous one's ends.
+    pub(super) members_end: usize,
+    pub(super) label: LabelVote,
+}
+
+/// The points of one row and the neighbour pixels they have claimed.
+#[derive(Default)]
+pub(super) struct RowClaims {
+    pub(super) claims: Vec<Claim>,
+    pub(super) members: Vec<Member>,
+}
+
+/// Decides row by row.
+pub(super) struct Merger<'a> {
+    pub(super) min_views: usize,
+    /// `None`: labels take no part.
+    pub(super) policy: Option<&'a ClassPolicy>,
+    behind: Vec<Member>,
+    dissenters: Vec<Member>,
+    vote: Vote,
+}
+
+/// What became of a candidate.
+enum Outcome {
+    Point(LabelVote),
+    TooFewViews,
+    InconsistentLabels,
+    ExcludedLabel,
+}
+
+impl<'a> Merger<'a> {
+    pub(super) fn new(min_views: usize, policy: Option<&'a ClassPolicy>) -> Self {
+        Merger { min_views, policy, behind: Vec::new(), dissenters: Vec::new(), vote: Vote::default() }
+    }
+
+    /// Turns the candidates of row `y` into points; `free` is parallel to `views` and loses the pixels that points
+    /// claim or push away. `invalidated` counts the latter by view.
+    pub(super) fn merge_row(
+        &mut self,
+        views: &[Participant<'_>],
+        y: u32,
+        row: &RowMatches,
+        free: &mut [FreePixels],
+        out: &mut RowClaims,
+        tally: &mut Tally,
+    ) {
+        out.claims.clear();
+        out.members.clear();
+        for (i, &x) in row.columns.iter().enumerate() {
+            let own = y * views[0].width + x;
+            let start = out.members.len();
+            self.collect(row, i, views.len() - 1, free, out);
+            match self.judge(views, own, &out.members[start..]) {
+                Outcome::Point(label) => {
+                    free[0].take(own);
+                    for hidden in &self.behind {
+                        free[hidden.view as usize].take(hidden.pixel);
+                        tally.invalidated[hidden.view as usize] += 1;
+                    }
+                    tally.add_point(label);
+                    out.claims.push(Claim { column: i, members_end: out.members.len(), label });
+                    continue;
+                }
+                Outcome::TooFewViews => {}
+                Outcome::InconsistentLabels => {
+                    tally.class(views[0].label(own as usize)).rejected_by_consistency += 1;
+                }
+                Outcome::ExcludedLabel => tally.class(views[0].label(own as usize)).rejected_by_class += 1,
+            }
+            for member in out.members.drain(start..) {
+                free[member.view as usize].give_back(member.pixel);
+            }
+        }
+    }
+
+    /// Claims the free pixels that agree with candidate `i` and notes the others of interest.
+    fn collect(
+        &mut self,
+        row: &RowMatches,
+        i: usize,
+        neighbors: usize,
+        free: &mut [FreePixels],
+        out: &mut RowClaims,
+    ) {
+        self.behind.clear();
+        self.dissenters.clear();
+        for neighbor in 0..neighbors {
+            let Some((relation, pixel)) = row.get(neighbor, i) else { continue };
+            if !free[neighbor + 1].contains(pixel) {
+                continue;
+            }
+            let member = Member { view: neighbor as u32 + 1, pixel };
+            match relation {
+                Relation::Agrees => {
+                    free[neighbor + 1].take(pixel);
+                    out.members.push(member);
+                }
+                Relation::Dissents => self.dissenters.push(member),
+                Relation::Behind => self.behind.push(member),
+            }
+        }
+    }
+
+    fn judge(&mut self, views: &[Participant<'_>], own: u32, members: &[Member]) -> Outcome {
+        let enough = members.len() + 1 >= self.min_views;
+        let Some(policy) = self.policy else {
+            return if enough { Outcome::Point(LabelVote::default()) } else { Outcome::TooFewViews };
+        };
+        if !enough {
+            let missed = members.len() + 1 + self.dissenters.len() >= self.min_views;
+            return if missed { Outcome::InconsistentLabels } else { Outcome::TooFewViews };
+        }
+        if policy.consistency() == Consistency::Strict && !self.dissenters.is_empty() {
+            return Outcome::InconsistentLabels;
+        }
+        let pixel = |m: &Member| (&views[m.view as usize], m.pixel as usize);
+        self.vote.clear();
+        self.vote.support(views[0].label(own as usize), views[0].weight(own as usize));
+        for (view, pixel) in members.iter().map(pixel) {
+            self.vote.support(view.label(pixel), view.weight(pixel));
+        }
+        for (view, pixel) in self.dissenters.iter().map(pixel) {
+            self.vote.dissent(view.label(pixel), view.weight(pixel));
+        }
+        let label = self.vote.outcome(views[0].label(own as usize));
+        if policy.is_kept(label.label) { Outcome::Point(label) } else { Outcome::ExcludedLabel }
+    }
+}

@@ -1,0 +1,28 @@
+//! Depth maps to points.
+//!
+//! Maps are immutable; what points claim is kept in one bit per pixel beside them, so maps can leave memory and come
+//! back. A view's turn has three passes over bands of rows: correspondences (parallel), claims (in raster order),
+//! sums (parallel). Only the second depends on order, and it touches bits alone; so the result is the sequential one
+//! for any number of threads.
+
+mod accumulate;
+mod color;
+mod correspond;
+mod lens;
+mod maps;
+mod merge;
+mod options;
+mod order;
+mod plan;
+mod state;
+mod stream;
+mod summary;
+mod unfused;
+mod working_set;
+
+pub use maps::{FusionMaps, MapSource};
+pub use options::{AttributeSource, FusionOptions};
+pub use plan::{FusionView, MapInfo};
+pub use stream::{FusionInput, fuse};
+pub use summary::{ClassCounts, FusionSummary};
+pub use unfused::project_maps;

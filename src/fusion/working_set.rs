@@ -1,0 +1,139 @@
+//! The maps in memory: loaded before the step that needs them, dropped after their last use or when memory
+//! is short.
+
+use super::plan::FusionPlan;
+use super::state::FreePixels;
+use super::{FusionMaps, FusionView, MapSource};
+use crate::error::{Error, Result};
+use crate::scene::ViewIndex;
+use rayon::prelude::*;
+
+/// Largest number of pixels of a map: correspondences are stored in 30 bits.
+const MAX_PIXELS: usize = 1 << 30;
+
+/// Maps by view, and the state of their pixels, which outlives them.
+pub(super) struct WorkingSet<'a> {
+    views: &'a [FusionView],
+    plan: &'a FusionPlan,
+    source: &'a dyn MapSource,
+    memory: u64,
+    maps: Vec<Option<FusionMaps>>,
+    free: Vec<Option<FreePixels>>,
+    /// Free pixels that were invalidated before their view's own step.
+    invalidated: Vec<u64>,
+}
+
+impl<'a> WorkingSet<'a> {
+    pub(super) fn new(
+        views: &'a [FusionView],
+        plan: &'a FusionPlan,
+        source: &'a dyn MapSource,
+        memory: u64,
+    ) -> Self {
+        WorkingSet {
+            views,
+            plan,
+            source,
+            memory,
+            maps: vec![None; views.len()],
+            free: vec![None; views.len()],
+            invalidated: vec![0; views.len()],
+        }
+    }
+
+    /// Makes the maps of all views of `step` available.
+    pub(super) fn prepare(&mut self, step: usize) -> Result<()> {
+        let plan = self.plan;
+        let missing: Vec<ViewIndex> =
+            plan.steps[step].views().filter(|v| self.maps[v.index()].is_none()).collect();
+        let expected = missing.iter().map(|v| self.expected_bytes(*v)).sum();
+        self.make_room(step, expected);
+        let loaded: Vec<Result<FusionMaps>> = missing.par_iter().map(|&v| self.load(v)).collect();
+        for (view, maps) in missing.into_iter().zip(loaded) {
+            let maps = maps?;
+            let free = &mut self.free[view.index()];
+            if free.is_none() {
+                *free = Some(FreePixels::with_depth(maps.estimate.depth.data()));
+            }
+            self.maps[view.index()] = Some(maps);
+        }
+        Ok(())
+    }
+
+    /// Drops what no step after `step` needs.
+    pub(super) fn finish(&mut self, step: usize) {
+        for view in self.plan.steps[step].views() {
+            if self.plan.next_use(view, step + 1).is_none() {
+                self.maps[view.index()] = None;
+                self.free[view.index()] = None;
+            }
+        }
+    }
+
+    /// The maps of a view that the current step needs.
+    pub(super) fn maps(&self, view: ViewIndex) -> Result<&FusionMaps> {
+        self.maps[view.index()]
+            .as_ref()
+            .ok_or_else(|| Error::invalid(format!("view {} takes part in fusion without its maps", view.0)))
+    }
+
+    /// Takes the pixel state of a view out of the set; [`WorkingSet::restore`] it before the step ends.
+    pub(super) fn take_free(&mut self, view: ViewIndex) -> FreePixels {
+        self.free[view.index()].take().unwrap_or_default()
+    }
+
+    pub(super) fn restore(&mut self, view: ViewIndex, free: FreePixels) {
+        self.free[view.index()] = Some(free);
+    }
+
+    pub(super) fn add_invalidated(&mut self, view: ViewIndex, pixels: u64) {
+        self.invalidated[view.index()] += pixels;
+    }
+
+    /// Pixels of `view` invalidated so far.
+    pub(super) fn invalidated(&self, view: ViewIndex) -> u64 {
+        self.invalidated[view.index()]
+    }
+
+    fn load(&self, view: ViewIndex) -> Result<FusionMaps> {
+        let maps = self.source.load(view)?;
+        maps.check(view)?;
+        let announced = self.views[view.index()].maps;
+        if announced.is_none_or(|info| {
+            info.size != maps.size() || (self.plan.normals && maps.estimate.normal.is_none())
+        }) {
+            return Err(Error::invalid(format!(
+                "view {} ({}): the depth map changed while it was being fused; run again when nothing else \
+                 writes to the folder",
+                view.0, maps.estimate.image_name
+            )));
+        }
+        if maps.size().area() >= MAX_PIXELS {
+            return Err(Error::invalid(format!(
+                "view {} ({}): a depth map of {} is too large to fuse; estimate at a lower resolution",
+                view.0,
+                maps.estimate.image_name,
+                maps.size()
+            )));
+        }
+        Ok(maps)
+    }
+
+    /// An upper bound of what loading `view` takes.
+    fn expected_bytes(&self, view: ViewIndex) -> u64 {
+        self.views[view.index()].maps.map_or(0, |info| info.size.area() as u64 * 27)
+    }
+
+    /// Drops maps that `step` does not need until `expected` more bytes fit; those needed last go first.
+    fn make_room(&mut self, step: usize, expected: u64) {
+        let mut resident: u64 = self.maps.iter().flatten().map(FusionMaps::bytes).sum();
+        while resident + expected > self.memory {
+            let unneeded = (0..self.maps.len()).filter(|&v| self.maps[v].is_some()).filter_map(|v| {
+                let next = self.plan.next_use(ViewIndex(v as u32), step)?;
+                (next > step).then_some((next, v))
+            });
+            let Some((_, view)) = unneeded.max() else { return };
+            resident -= self.maps[view].take().map_or(0, |maps| maps.bytes());
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Fusion reproduces OpenMVS 2.3.0 from its own maps, point for point.
+
+mod openmvs_maps;
+
+use openmvs_maps::{MapsInMemory, cloud, facade6, scene, shared};
+use semvs::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
+use semvs::progress::Progress;
+use semvs::scene::{PointCloud, PointSource, ResolutionOptions};
+use semvs_formats::ply::Cloud;
+use std::path::Path;
+
+/// Largest distance of two positions relative to the largest coordinate of the cloud: f32 sums.
+const MAX_RELATIVE_DISTANCE: f32 = 1e-5;
+/// Largest angle of two normals, degrees.
+const MAX_NORMAL_DEG: f64 = 0.1;
+/// Largest relative difference of two fusion weights.
+const MAX_RELATIVE_WEIGHT: f32 = 1e-5;
+/// Share of the points that must be within the limits.
+const MIN_SHARE: f64 = 0.9999;
+/// Largest difference of a colour channel, levels: one JPEG decoder rounds as another one does not.
+const MAX_COLOR: u8 = 1;
+/// The same where images have reduced chroma, which decoders interpolate in different ways.
+const MAX_COLOR_SUBSAMPLED: u8 = 6;
+
+const FACADE6_RESOLUTION: ResolutionOptions = ResolutionOptions { level: 1, min: 160, max: 2560 };
+
+fn facade6_maps(maps: &str) -> MapsInMemory {
+    let folder = facade6().join("openmvs-2.3.0");
+    MapsInMemory::load(
+        &folder.join(maps),
+        &facade6(),
+        &scene(&folder.join("post7/scene_dense.mvs")),
+        FACADE6_RESOLUTION,
+    )
+}
+
+fn fused(maps: &MapsInMemory, options: &FusionOptions) -> (PointCloud, FusionSummary) {
+    let input = FusionInput { views: &maps.views, source: maps, policy: None };
+    let mut points = PointCloud::new(input.layout(options));
+    let summary = fuse(&input, options, &Progress::silent(), &mut points).unwrap();
+    assert_eq!(summary.points, points.len());
+    (points, summary)
+}
+
+fn assert_same_cloud(ours: &PointCloud, theirs: &Cloud, max_color: u8) {
+    assert_eq!(ours.len(), theirs.len() as u64, "number of points");
+    let extent = theirs.positions.iter().flatten().fold(0.0_f32, |m, v| m.max(v.abs()));
+    let min_cos = MAX_NORMAL_DEG.to_radians().cos();
+    let mut bad = [0; 5];
+    for (i, p) in ours.iter().enumerate() {
+        let q = theirs.positions[i];
+        let views: Vec<u32> = p.views.iter().map(|v| v.0).collect();
+        let weights = p.weights.iter().zip(theirs.weights_of(i));
+        let cos: f64 =
+            p.normal.iter().zip(theirs.normals[i]).map(|(a, b)| f64::from(*a) * f64::from(b)).sum();
+        let wrong = [
+            (0..3).any(|a| (p.position[a] - q[a]).abs() > MAX_RELATIVE_DISTANCE * extent),
+            views != theirs.images_of(i),
+            weights.clone().any(|(a, b)| (a - b).abs() > MAX_RELATIVE_WEIGHT * b.abs()),
+            cos < min_cos,
+            (0..3).any(|c| p.color[c].abs_diff(theirs.colors[i][c]) > max_color),
+        ];
+        bad.iter_mut().zip(wrong).for_each(|(count, wrong)| *count += usize::from(wrong));
+    }
+    let names = ["position", "views", "weights", "normal", "colour"];
+    println!("{} points; differing: {:?}", theirs.len(), names.iter().zip(bad).collect::<Vec<_>>());
+    for (name, bad) in names.iter().zip(bad) {
+        assert!(1.0 - bad as f64 / theirs.len() as f64 >= MIN_SHARE, "{bad} points differ in {name}");
+    }
+}
+
+#[test]
+fn three_views_per_point_are_fused_as_by_openmvs() {
+    let (points, summary) = fused(&facade6_maps("post7"), &FusionOptions::default());
+    assert_same_cloud(&points, &cloud(&facade6().join("openmvs-2.3.0/post7/scene_dense.ply.zst")), MAX_COLOR);
+    // From OpenMVS's console: "6 depth-maps, 132021 depths, 24171 points".
+    assert_eq!((summary.maps, summary.depths, summary.points), (6, 132_021, 24_171));
+}
+
+#[test]
+fn two_views_per_point_are_fused_as_by_openmvs() {
+    let options = FusionOptions { number_views_fuse: 2, ..FusionOptions::default() };
+    let (points, _) = fused(&facade6_maps("post7"), &options);
+    assert_same_cloud(&points, &cloud(&facade6().join("openmvs-2.3.0/fuse2/scene_dense.ply.zst")), MAX_COLOR);
+}
+
+#[test]
+fn a_photographed_scene_is_fused_as_by_openmvs() {
+    let Some(folder) = shared("reference/tests4") else { return };
+    let maps = tests4_maps(&folder);
+    let (points, _) = fused(&maps, &FusionOptions::default());
+    assert_same_cloud(&points, &cloud(&folder.join("fuse_fuse3/scene_dense.ply.zst")), MAX_COLOR_SUBSAMPLED);
+}
+
+fn tests4_maps(folder: &Path) -> MapsInMemory {
+    let dense = scene(&folder.join("fuse_fuse3/scene_dense.mvs"));
+    MapsInMemory::load(&folder.join("post7"), folder, &dense, ResolutionOptions::default())
+}
