@@ -11,5 +11,6 @@ pub mod progress;
 pub mod scene;
 pub mod semantics;
 pub mod store;
+pub mod stereo;
 
 pub use error::{Error, Result};

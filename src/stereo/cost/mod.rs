@@ -1,0 +1,106 @@
+//! Kernels of the estimator: the contract, and the choice of the instruction set.
+//!
+//! Every kernel works on one [`Tile`]. [`portable`] is the one implementation; the instruction-set files compile it
+//! again with more features enabled, and because it uses no fused multiply-add and no reassociation all levels
+//! give the same bytes.
+
+mod math;
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use super::level::Level;
+use super::plane::InversePlane;
+use super::tile::Tile;
+
+/// Instruction set used by the kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CpuLevel {
+    /// What every processor of the architecture has.
+    Scalar,
+    /// x86-64 with AVX2.
+    Avx2,
+    /// x86-64 with AVX-512 F, BW, DQ and VL.
+    Avx512,
+}
+
+impl CpuLevel {
+    /// The best level that this processor has.
+    pub fn detect() -> Self {
+        [CpuLevel::Avx512, CpuLevel::Avx2].into_iter().find(|l| l.is_supported()).unwrap_or(CpuLevel::Scalar)
+    }
+
+    /// Whether this processor has the level.
+    pub fn is_supported(self) -> bool {
+        match self {
+            CpuLevel::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            CpuLevel::Avx2 => std::is_x86_feature_detected!("avx2"),
+            #[cfg(target_arch = "x86_64")]
+            CpuLevel::Avx512 => {
+                std::is_x86_feature_detected!("avx2")
+                    && std::is_x86_feature_detected!("avx512f")
+                    && std::is_x86_feature_detected!("avx512bw")
+                    && std::is_x86_feature_detected!("avx512dq")
+                    && std::is_x86_feature_detected!("avx512vl")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => false,
+        }
+    }
+
+    /// Name as given on the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            CpuLevel::Scalar => "scalar",
+            CpuLevel::Avx2 => "avx2",
+            CpuLevel::Avx512 => "avx512",
+        }
+    }
+}
+
+impl std::str::FromStr for CpuLevel {
+    type Err = crate::Error;
+
+    fn from_str(s: &str) -> crate::Result<Self> {
+        let all = [CpuLevel::Scalar, CpuLevel::Avx2, CpuLevel::Avx512];
+        let level = all.into_iter().find(|l| l.name() == s).ok_or_else(|| {
+            crate::Error::invalid(format!("unknown CPU level \"{s}\"; known are scalar, avx2 and avx512"))
+        })?;
+        if !level.is_supported() {
+            return Err(crate::Error::invalid(format!("this processor does not have CPU level {s}")));
+        }
+        Ok(level)
+    }
+}
+
+/// The kernels of one level.
+#[derive(Clone, Copy)]
+pub(crate) struct Kernels {
+    /// Bilateral weights and statistics of the loaded tile's patches, and the weight of its prior.
+    pub(crate) prepare: fn(&mut Tile, &Level),
+    /// Unit normals of the surround and total costs of the loaded estimates.
+    pub(crate) begin: fn(&mut Tile, &Level),
+    /// Matching cost of every pixel's own plane.
+    pub(crate) score_own: fn(&mut Tile, &Level),
+    /// Tries a plane anchored at the tile's centre on all pixels; whether any took it.
+    pub(crate) try_plane: fn(&mut Tile, &Level, InversePlane) -> bool,
+}
+
+impl Kernels {
+    /// The kernels of `level`, or portable ones if this processor lacks it.
+    pub(crate) fn of(level: CpuLevel) -> Self {
+        match level {
+            #[cfg(target_arch = "x86_64")]
+            CpuLevel::Avx2 if level.is_supported() => x86::AVX2,
+            #[cfg(target_arch = "x86_64")]
+            CpuLevel::Avx512 if level.is_supported() => x86::AVX512,
+            _ => Kernels {
+                prepare: portable::prepare,
+                begin: portable::begin,
+                score_own: portable::score_own,
+                try_plane: portable::try_plane,
+            },
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! One resolution of a stereo problem: the reference, the sources and the maps between them.
+
+use super::plane::Pinhole;
+use super::problem::{SourceImage, StereoProblem};
+use super::tile::{REACH, TILE_W, WIN_W};
+use crate::geometry::{Camera, Size};
+use crate::scene::resample::resize_gray;
+use crate::scene::{DepthEstimate, GrayImage};
+use nalgebra::{Matrix3, Vector3};
+
+/// Pixels around an image that tiles may reach into.
+pub(crate) const PAD: usize = 32;
+/// Mid-grey, subtracted so that sums of squares keep their digits.
+const MID_GREY: f32 = 128.0;
+
+/// The reference image with a margin, grey levels 0..255 minus mid-grey.
+pub(crate) struct Reference {
+    stride: usize,
+    data: Vec<f32>,
+}
+
+impl Reference {
+    fn new(gray: &GrayImage) -> Self {
+        let (w, h) = (gray.width(), gray.height());
+        let stride = w + 2 * PAD;
+        let mut data = Vec::with_capacity(stride * (h + 2 * PAD));
+        for y in 0..h + 2 * PAD {
+            let row = gray.row(y.saturating_sub(PAD).min(h - 1));
+            for x in 0..stride {
+                data.push(row[x.saturating_sub(PAD).min(w - 1)] * 255.0 - MID_GREY);
+            }
+        }
+        Reference { stride, data }
+    }
+
+    /// `n` grey levels from column `x` of row `y`, which may lie up to [`PAD`] outside.
+    pub(crate) fn window(&self, x: i32, y: i32, n: usize) -> &[f32] {
+        let at = (y + PAD as i32) as usize * self.stride + (x + PAD as i32) as usize;
+        &self.data[at..at + n]
+    }
+}
+
+/// A source image and the projection from (reference pixel, inverse depth) into it.
+pub(crate) struct Source {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Per pixel the 2×2 grey levels (×256) from it to the right and below, 16 bits each.
+    pub(crate) quads: Vec<u64>,
+    /// Homogeneous source pixel = `a · (x, y, 1) + b · w`.
+    pub(crate) a: [[f32; 3]; 3],
+    pub(crate) b: [f32; 3],
+    /// Planes of the source's own depth map, if the geometric term is on.
+    pub(crate) geometry: Option<SourceGeometry>,
+}
+
+/// The depth map of a source view as planes of inverse depth, and the way into it.
+pub(crate) struct SourceGeometry {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Per pixel inverse depth, its change per column and per row, 0; inverse depth 0 = none.
+    pub(crate) planes: Vec<[f32; 4]>,
+    pub(crate) a: [[f32; 3]; 3],
+    pub(crate) b: [f32; 3],
+    /// Pixels of the reference that one unit of the source's inverse depth amounts to.
+    pub(crate) pixels_per_w: f32,
+}
+
+/// One resolution of a stereo problem.
+pub(crate) struct Level {
+    pub(crate) size: Size,
+    pub(crate) pinhole: Pinhole,
+    pub(crate) reference: Reference,
+    pub(crate) sources: Vec<Source>,
+    /// Smallest and largest inverse depth allowed.
+    pub(crate) w_range: (f32, f32),
+    /// Largest shift in any source, in pixels, per unit of inverse depth, at the image centre.
+    pub(crate) pixels_per_w: f32,
+    /// Weight of the geometric term.
+    pub(crate) geometric_weight: f32,
+}
+
+impl Level {
+    /// The problem at full resolution divided by `2^halvings`.
+    pub(crate) fn new(problem: &StereoProblem, halvings: u32) -> Self {
+        let (gray, camera) = shrunk(&problem.reference, halvings);
+        let (fx, fy, cx, cy) = camera.intrinsics();
+        let pinhole = Pinhole { fx: fx as f32, fy: fy as f32, cx: cx as f32, cy: cy as f32 };
+        let w_range = (1.0 / problem.depth_range.1, 1.0 / problem.depth_range.0);
+        let w_mid = typical_inverse_depth(problem);
+        let mut pixels_per_w = 0.0f32;
+        let sources = problem
+            .sources
+            .iter()
+            .map(|s| {
+                let (gray, source_camera) = shrunk(s, halvings);
+                let (a, b) = transfer(&camera, &source_camera);
+                pixels_per_w = pixels_per_w.max(shift_per_w(&a, &b, camera.size(), w_mid));
+                Source {
+                    width: gray.width(),
+                    height: gray.height(),
+                    quads: quads(&gray),
+                    a: rows_f32(&a),
+                    b: [b.x as f32, b.y as f32, b.z as f32],
+                    geometry: None,
+                }
+            })
+            .collect();
+        Level {
+            size: camera.size(),
+            pinhole,
+            reference: Reference::new(&gray),
+            sources,
+            w_range,
+            pixels_per_w: pixels_per_w.max(f32::MIN_POSITIVE),
+            geometric_weight: 0.0,
+        }
+    }
+
+    /// Adds the sources' own depth maps, so that hypotheses are also compared with them.
+    pub(crate) fn with_geometry<'a>(
+        mut self,
+        reference: &Camera,
+        maps: impl Iterator<Item = Option<&'a DepthEstimate>>,
+        weight: f32,
+    ) -> Self {
+        self.geometric_weight = weight;
+        for (source, map) in self.sources.iter_mut().zip(maps) {
+            source.geometry = map.map(|m| source_geometry(reference, m));
+        }
+        self
+    }
+}
+
+/// Image and camera divided by `2^halvings`.
+fn shrunk(image: &SourceImage, halvings: u32) -> (GrayImage, Camera) {
+    if halvings == 0 {
+        return ((*image.gray).clone(), image.camera.clone());
+    }
+    let small = resize_gray(&image.gray, 1.0 / f64::from(1u32 << halvings.min(16)));
+    let camera = image.camera.scaled_per_axis(small.size());
+    (small, camera)
+}
+
+/// `A = K₁R₁R₀ᵀK₀⁻¹` and `b = K₁R₁(C₀ − C₁)`: the source pixel of a reference pixel at inverse depth w is `A p + b w`.
+fn transfer(reference: &Camera, source: &Camera) -> (Matrix3<f64>, Vector3<f64>) {
+    let kr = source.k() * source.rotation();
+    let inverse_k = inverse_intrinsics(reference);
+    (kr * reference.rotation().transpose() * inverse_k, kr * (reference.center() - source.center()))
+}
+
+/// Inverse of K without skew: what back-projection uses.
+fn inverse_intrinsics(camera: &Camera) -> Matrix3<f64> {
+    let (fx, fy, cx, cy) = camera.intrinsics();
+    Matrix3::new(1.0 / fx, 0.0, -cx / fx, 0.0, 1.0 / fy, -cy / fy, 0.0, 0.0, 1.0)
+}
+
+fn rows_f32(m: &Matrix3<f64>) -> [[f32; 3]; 3] {
+    std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)] as f32))
+}
+
+/// How far the projection of the image centre moves per unit of inverse depth around `w`.
+fn shift_per_w(a: &Matrix3<f64>, b: &Vector3<f64>, size: Size, w: f32) -> f32 {
+    let p = Vector3::new(f64::from(size.width) / 2.0, f64::from(size.height) / 2.0, 1.0);
+    let q = a * p + b * f64::from(w);
+    if q.z.abs() < 1e-12 {
+        return 0.0;
+    }
+    let (u, v) = (q.x / q.z, q.y / q.z);
+    (((b.x - u * b.z) / q.z).hypot((b.y - v * b.z) / q.z)) as f32
+}
+
+/// Median inverse depth of the sparse points, or the middle of the range.
+fn typical_inverse_depth(problem: &StereoProblem) -> f32 {
+    let mut w: Vec<f32> = problem.sparse.iter().map(|p| 1.0 / p.depth).collect();
+    if w.is_empty() {
+        return 0.5 / problem.depth_range.0 + 0.5 / problem.depth_range.1;
+    }
+    w.sort_unstable_by(f32::total_cmp);
+    w[w.len() / 2]
+}
+
+/// Packs every pixel's 2×2 grey levels.
+fn quads(gray: &GrayImage) -> Vec<u64> {
+    let (w, h) = (gray.width(), gray.height());
+    let level = |v: f32| u64::from((v.clamp(0.0, 1.0) * 255.0 * 256.0).round() as u16);
+    let rows: Vec<u64> = gray.data().iter().map(|&v| level(v)).collect();
+    let mut out = Vec::with_capacity(w * h);
+    for y in 0..h {
+        let top = &rows[y * w..][..w];
+        let bottom = &rows[(y + 1).min(h - 1) * w..][..w];
+        for x in 0..w {
+            let next = (x + 1).min(w - 1);
+            out.push(top[x] | top[next] << 16 | bottom[x] << 32 | bottom[next] << 48);
+        }
+    }
+    out
+}
+
+fn source_geometry(reference: &Camera, map: &DepthEstimate) -> SourceGeometry {
+    let (a, b) = transfer(reference, &map.camera);
+    let (fx, fy, cx, cy) = map.camera.intrinsics();
+    let pinhole = Pinhole { fx: fx as f32, fy: fy as f32, cx: cx as f32, cy: cy as f32 };
+    let width = map.depth.width();
+    let normals = map.normal.as_ref().map(|n| n.data());
+    let planes = map
+        .depth
+        .data()
+        .iter()
+        .enumerate()
+        .map(|(i, &depth)| {
+            if depth <= 0.0 {
+                return [0.0; 4];
+            }
+            let n = normals.map_or([0.0, 0.0, -1.0], |n| n[i]);
+            let p = pinhole.plane((i % width) as f32, (i / width) as f32, depth, n);
+            [p.w, p.wx, p.wy, 0.0]
+        })
+        .collect();
+    let baseline = (reference.center() - map.camera.center()).norm();
+    let (rx, _, _, _) = reference.intrinsics();
+    SourceGeometry {
+        width,
+        height: map.depth.height(),
+        planes,
+        a: rows_f32(&a),
+        b: [b.x as f32, b.y as f32, b.z as f32],
+        pixels_per_w: (rx * baseline) as f32,
+    }
+}
+
+const _: () = assert!(PAD >= WIN_W + REACH && PAD >= TILE_W + REACH);

@@ -1,0 +1,66 @@
+//! What the estimator may be told.
+
+use crate::{Error, Result};
+
+/// Options of depth estimation. Angles are in degrees, costs on the 0 (best) .. 2 (worst) scale.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StereoOptions {
+    /// Coarser levels estimated before the full resolution, each half the size of the next. 0..=8. Default: 2.
+    pub levels: u32,
+    /// Iterations over all tiles on every level. 1..=100. Default: 3.
+    pub iterations: u32,
+    /// Passes that also compare a hypothesis with the neighbours' depth maps. 0..=100. Default: 2.
+    pub geometric_iterations: u32,
+    /// Hypotheses of each kind that a tile tries at a visit. 1..=64. Default: 6.
+    pub candidates: u32,
+    /// A pixel whose final cost is not below this has no depth. (0, 2]. Default: 0.9.
+    pub keep_cost: f32,
+    /// Weight of the geometric term: cost added per pixel of disagreement, at most four. >= 0. Default: 0.1.
+    pub geometric_weight: f32,
+    /// Seed of every random number. Default: 0.
+    pub seed: u64,
+}
+
+impl Default for StereoOptions {
+    fn default() -> Self {
+        StereoOptions {
+            levels: 2,
+            iterations: 3,
+            geometric_iterations: 2,
+            candidates: 6,
+            keep_cost: 0.9,
+            geometric_weight: 0.1,
+            seed: 0,
+        }
+    }
+}
+
+impl StereoOptions {
+    /// Checks the ranges stated at the fields.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names the option, its value and the allowed range.
+    pub fn check(&self) -> Result<()> {
+        let whole = [
+            ("levels", self.levels, 0, 8),
+            ("iterations", self.iterations, 1, 100),
+            ("geometric iterations", self.geometric_iterations, 0, 100),
+            ("candidates", self.candidates, 1, 64),
+        ];
+        for (name, value, low, high) in whole {
+            if !(low..=high).contains(&value) {
+                return Err(Error::invalid(format!("{name} is {value}; it must be {low} to {high}")));
+            }
+        }
+        if !(self.keep_cost > 0.0 && self.keep_cost <= 2.0) {
+            return Err(Error::invalid(format!("keep cost is {}; it must be above 0, at most 2", self.keep_cost)));
+        }
+        if !(self.geometric_weight >= 0.0 && self.geometric_weight.is_finite()) {
+            return Err(Error::invalid(format!(
+                "geometric weight is {}; it must be 0 or more",
+                self.geometric_weight
+            )));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,46 @@
+//! One view to estimate and what it is matched with.
+
+use crate::geometry::Camera;
+use crate::scene::{Grid, GrayImage, ImageId};
+use std::sync::Arc;
+
+/// A grey image with its camera at the size of that image.
+#[derive(Clone, Debug)]
+pub struct SourceImage {
+    /// Luma, 0 black .. 1 white.
+    pub gray: Arc<GrayImage>,
+    /// Camera at the size of `gray`.
+    pub camera: Camera,
+    /// Global ID of the view.
+    pub id: ImageId,
+}
+
+/// A sparse point seen by the reference view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparsePoint {
+    /// Column in the reference image, pixels.
+    pub x: f32,
+    /// Row in the reference image, pixels.
+    pub y: f32,
+    /// Depth along the reference's optical axis.
+    pub depth: f32,
+    /// Surface normal in the camera frame, facing the camera, if one could be derived.
+    pub normal: Option<[f32; 3]>,
+}
+
+/// One reference view, the source views it is matched with, and what is known beforehand.
+#[derive(Clone, Debug)]
+pub struct StereoProblem {
+    /// The view to estimate.
+    pub reference: SourceImage,
+    /// Path of the reference image as the scene names it.
+    pub image_name: String,
+    /// The views it is matched with, best first; at least one.
+    pub sources: Vec<SourceImage>,
+    /// Every hypothesis has its depth in `[min, max)`; `0 < min < max`.
+    pub depth_range: (f32, f32),
+    /// Sparse points that start the search.
+    pub sparse: Vec<SparsePoint>,
+    /// Pixels that get no depth (masked, or of a class that is not estimated).
+    pub skip: Option<Grid<bool>>,
+}

@@ -1,0 +1,166 @@
+//! The schedule: levels, passes over shifted tiles, and what each visit tries.
+
+use super::candidates::{self, CELLS};
+use super::cost::Kernels;
+use super::level::Level;
+use super::plane::InversePlane;
+use super::rng::Rng;
+use super::state::State;
+use super::tile::{CENTRE, TILE_H, TILE_W, Tile};
+
+/// Planes closer than this at all four corners, in pixels of shift, count as tried.
+const SAME_PLANE: f32 = 0.03;
+/// Shift of the tile grid in successive passes.
+const SHIFTS: [(i32, i32); 4] = [(0, 0), (-8, -4), (-4, -2), (-12, -6)];
+/// Mean cost above which a tile is tried with random planes.
+const BAD_TILE: f32 = 0.5;
+
+/// What a pass over all tiles does.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pass {
+    /// Keys the random numbers; different for every pass over a view.
+    pub(crate) key: u32,
+    /// Iteration within the level: later ones shake less.
+    pub(crate) iteration: u32,
+    /// Which shift of the tile grid.
+    pub(crate) shift: usize,
+    /// Candidates of each kind.
+    pub(crate) candidates: usize,
+    /// Random planes tried on every tile.
+    pub(crate) random: usize,
+    /// Random planes tried on tiles that match badly.
+    pub(crate) random_if_bad: usize,
+    /// Whether the visit starts from planes of a coarser level whose costs mean little.
+    pub(crate) fresh: bool,
+}
+
+/// Estimates one view: holds what the passes share.
+pub(crate) struct Solver<'a> {
+    pub(crate) kernels: Kernels,
+    pub(crate) level: &'a Level,
+    pub(crate) seed: u64,
+    pub(crate) view: u32,
+    tile: Box<Tile>,
+    tried: Vec<[f32; 4]>,
+}
+
+impl<'a> Solver<'a> {
+    pub(crate) fn new(kernels: Kernels, level: &'a Level, seed: u64, view: u32) -> Self {
+        Solver { kernels, level, seed, view, tile: Tile::boxed(), tried: Vec::with_capacity(64) }
+    }
+
+    /// Matching cost of every pixel's current plane.
+    pub(crate) fn score(&mut self, state: &mut State) {
+        for (x0, y0) in tiles(self.level, (0, 0)) {
+            self.tile.load(self.level, state, x0, y0);
+            (self.kernels.prepare)(&mut self.tile, self.level);
+            (self.kernels.score_own)(&mut self.tile, self.level);
+            self.tile.store(state);
+        }
+    }
+
+    /// One pass over all tiles; every second pass goes backwards.
+    pub(crate) fn pass(&mut self, state: &mut State, pass: Pass) {
+        let mut order = tiles(self.level, SHIFTS[pass.shift % SHIFTS.len()]);
+        if pass.iteration % 2 == 1 {
+            order.reverse();
+        }
+        for (i, (x0, y0)) in order.into_iter().enumerate() {
+            self.tile.load(self.level, state, x0, y0);
+            if self.tile.belief.active.iter().flatten().all(|&a| a < 0.5) {
+                continue;
+            }
+            let mut rng = Rng::keyed(self.seed, self.view, pass.key, i as u32);
+            self.visit(state, pass, &mut rng);
+            self.tile.store(state);
+        }
+    }
+
+    fn visit(&mut self, state: &State, pass: Pass, rng: &mut Rng) {
+        (self.kernels.prepare)(&mut self.tile, self.level);
+        (self.kernels.begin)(&mut self.tile, self.level);
+        self.tried.clear();
+        let first = rng.below(CELLS);
+        let own = if pass.fresh { CELLS } else { pass.candidates.min(CELLS) };
+        for k in 0..own {
+            if let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k))
+                && cost < 1.5
+            {
+                self.offer(self.tile.plane_at(x, y));
+            }
+        }
+        for k in 0..pass.candidates {
+            if let Some(p) = candidates::beside(self.level, state, &self.tile, k, rng) {
+                self.offer(p);
+            }
+        }
+        let cost = self.mean_cost();
+        let bad = if cost > BAD_TILE { pass.random_if_bad } else { 0 };
+        for _ in 0..pass.random + bad {
+            let p = candidates::random(self.level, rng);
+            (self.kernels.try_plane)(&mut self.tile, self.level, p);
+        }
+        for k in 0..pass.candidates {
+            self.shake(pass, first, k, rng);
+        }
+        for k in 0..pass.candidates {
+            self.fit(first, k);
+        }
+    }
+
+    fn shake(&mut self, pass: Pass, first: usize, k: usize, rng: &mut Rng) {
+        let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k)) else { return };
+        if cost > 1.5 {
+            return;
+        }
+        let halvings = (k % 3) as i32 + pass.iteration as i32;
+        let strength = if cost > 0.6 { 1.0 } else { 0.5f32.powi(halvings) };
+        let p = candidates::shaken(self.level, &self.tile, x, y, strength, rng);
+        (self.kernels.try_plane)(&mut self.tile, self.level, p);
+    }
+
+    fn fit(&mut self, first: usize, k: usize) {
+        let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k)) else { return };
+        let radius = if k % 2 == 0 { 3 } else { 5 };
+        if cost <= 1.0
+            && let Some(p) = candidates::fitted(self.level, &self.tile, x, y, radius)
+        {
+            self.offer(p);
+        }
+    }
+
+    /// Tries a plane unless nearly the same one was tried at this visit.
+    fn offer(&mut self, p: InversePlane) {
+        let same = SAME_PLANE / self.level.pixels_per_w;
+        let (cx, cy) = CENTRE;
+        let corners = [(-cx, -cy), (cx, -cy), (-cx, cy), (cx, cy)].map(|(dx, dy)| p.moved(dx, dy).w);
+        let known = |t: &[f32; 4]| t.iter().zip(&corners).all(|(a, b)| (a - b).abs() < same);
+        if self.tried.iter().any(known) {
+            return;
+        }
+        self.tried.push(corners);
+        (self.kernels.try_plane)(&mut self.tile, self.level, p);
+    }
+
+    fn mean_cost(&self) -> f32 {
+        let b = &self.tile.belief;
+        let (mut sum, mut n) = (0.0f32, 0.0f32);
+        for (data, active) in b.data.iter().flatten().zip(b.active.iter().flatten()) {
+            sum += data.min(super::tile::ROBUST_COST) * active;
+            n += active;
+        }
+        sum / n.max(1.0)
+    }
+}
+
+/// First pixels of the tiles that cover the level, row by row, with the grid moved by `shift`.
+fn tiles(level: &Level, shift: (i32, i32)) -> Vec<(i32, i32)> {
+    let (w, h) = (level.size.width as i32, level.size.height as i32);
+    let mut out = Vec::new();
+    for y in (shift.1..h).step_by(TILE_H) {
+        for x in (shift.0..w).step_by(TILE_W) {
+            out.push((x, y));
+        }
+    }
+    out
+}

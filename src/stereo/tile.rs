@@ -1,0 +1,208 @@
+//! The working set of one 16×8 tile: everything a kernel reads and writes, a few tens of kilobytes.
+//!
+//! All pixels of a tile test the same plane, so that the source window is warped once for all of them
+//! (Lu et al. 2013, PatchMatch Filter; Taniai et al. 2018, local expansion moves).
+
+use super::level::Level;
+use super::plane::InversePlane;
+use super::state::State;
+
+/// Columns of a tile.
+pub(crate) const TILE_W: usize = 16;
+/// Rows of a tile.
+pub(crate) const TILE_H: usize = 8;
+/// Reach of the matching window: 9×9 pixels, every second one sampled.
+pub(crate) const REACH: usize = 4;
+/// Columns of the tile and its window margin.
+pub(crate) const WIN_W: usize = TILE_W + 2 * REACH;
+/// Rows of the tile and its window margin.
+pub(crate) const WIN_H: usize = TILE_H + 2 * REACH;
+/// Texels of a matching window.
+pub(crate) const TAPS: usize = 25;
+/// Column and row of the tile's centre, where its planes are anchored.
+pub(crate) const CENTRE: (f32, f32) = ((TILE_W as f32 - 1.0) / 2.0, (TILE_H as f32 - 1.0) / 2.0);
+/// Cost of a view that cannot be compared: out of the image, or without texture.
+pub(crate) const ROBUST_COST: f32 = 1.2;
+/// Larger than any cost.
+pub(crate) const UNSEEN: f32 = 9.0;
+
+/// One value per pixel of a tile row.
+pub(crate) type Row = [f32; TILE_W];
+/// One value per column of the window.
+pub(crate) type WinRow = [f32; WIN_W];
+/// One value per pixel of the tile.
+pub(crate) type TileMap = [Row; TILE_H];
+/// One value per pixel of the tile and its one-pixel surround: pixel (x, y) is at `[y + 1][x + 1]`.
+pub(crate) type HaloMap = [WinRow; TILE_H + 2];
+
+/// The reference window and the statistics of every pixel's patch.
+#[repr(align(64))]
+pub(crate) struct Patch {
+    /// Grey levels 0..255 minus mid-grey.
+    pub(crate) texel: [WinRow; WIN_H],
+    /// Bilateral weight of every texel of every pixel's window; 0 outside the image.
+    pub(crate) weight: [[Row; TAPS]; TILE_H],
+    /// Sum of the weights.
+    pub(crate) sum_weight: TileMap,
+    /// Weighted mean of the texels.
+    pub(crate) mean: TileMap,
+    /// Weighted sum of squared deviations.
+    pub(crate) norm: TileMap,
+}
+
+/// What is currently believed about the tile's pixels.
+#[repr(align(64))]
+pub(crate) struct Belief {
+    /// Inverse depth.
+    pub(crate) w: TileMap,
+    /// Change of inverse depth per column.
+    pub(crate) wx: TileMap,
+    /// Change of inverse depth per row.
+    pub(crate) wy: TileMap,
+    /// Matching cost, with the geometric term, without smoothness and prior.
+    pub(crate) data: TileMap,
+    /// Cost with smoothness and prior: what candidates compete with.
+    pub(crate) total: TileMap,
+    /// Inverse depth of the coarser level.
+    pub(crate) prior_w: TileMap,
+    /// Weight of the prior, 0..1: near 1 where there is no texture.
+    pub(crate) prior_k: TileMap,
+    /// 1 for pixels that are estimated, 0 for skipped ones and outside the image.
+    pub(crate) active: TileMap,
+}
+
+/// Planes of the tile's pixels and their surround, as unit normals and inverse depths.
+#[repr(align(64))]
+pub(crate) struct Halo {
+    /// First component of the unit plane vector.
+    pub(crate) nx: HaloMap,
+    /// Second component.
+    pub(crate) ny: HaloMap,
+    /// Third component.
+    pub(crate) nz: HaloMap,
+    /// Inverse depth.
+    pub(crate) w: HaloMap,
+    /// 1 where there is an estimate, else 0.
+    pub(crate) on: HaloMap,
+}
+
+/// Scratch of one candidate.
+#[repr(align(64))]
+pub(crate) struct Scratch {
+    /// Source window warped by the candidate.
+    pub(crate) warped: [WinRow; WIN_H],
+    /// 1 where the warped sample lies inside the source.
+    pub(crate) valid: [WinRow; WIN_H],
+    /// Cost of the view at hand.
+    pub(crate) cost: TileMap,
+    /// Smallest cost over the views so far.
+    pub(crate) best: TileMap,
+    /// Second smallest.
+    pub(crate) second: TileMap,
+    /// Smoothness factor that a surround pixel contributes to its neighbours.
+    pub(crate) smooth: HaloMap,
+}
+
+/// The working set of one tile.
+pub(crate) struct Tile {
+    /// Column of the first pixel; may be negative.
+    pub(crate) x0: i32,
+    /// Row of the first pixel; may be negative.
+    pub(crate) y0: i32,
+    pub(crate) patch: Patch,
+    pub(crate) belief: Belief,
+    pub(crate) halo: Halo,
+    pub(crate) scratch: Scratch,
+}
+
+const ZERO_TILE: TileMap = [[0.0; TILE_W]; TILE_H];
+const ZERO_HALO: HaloMap = [[0.0; WIN_W]; TILE_H + 2];
+const ZERO_WIN: [WinRow; WIN_H] = [[0.0; WIN_W]; WIN_H];
+
+impl Tile {
+    /// A tile of zeros on the heap.
+    pub(crate) fn boxed() -> Box<Tile> {
+        Box::new(Tile {
+            x0: 0,
+            y0: 0,
+            patch: Patch {
+                texel: ZERO_WIN,
+                weight: [[[0.0; TILE_W]; TAPS]; TILE_H],
+                sum_weight: ZERO_TILE,
+                mean: ZERO_TILE,
+                norm: ZERO_TILE,
+            },
+            belief: Belief {
+                w: ZERO_TILE,
+                wx: ZERO_TILE,
+                wy: ZERO_TILE,
+                data: ZERO_TILE,
+                total: ZERO_TILE,
+                prior_w: ZERO_TILE,
+                prior_k: ZERO_TILE,
+                active: ZERO_TILE,
+            },
+            halo: Halo { nx: ZERO_HALO, ny: ZERO_HALO, nz: ZERO_HALO, w: ZERO_HALO, on: ZERO_HALO },
+            scratch: Scratch {
+                warped: ZERO_WIN,
+                valid: ZERO_WIN,
+                cost: ZERO_TILE,
+                best: ZERO_TILE,
+                second: ZERO_TILE,
+                smooth: ZERO_HALO,
+            },
+        })
+    }
+
+    /// The plane of pixel `(x, y)` of the tile, anchored at the tile's centre.
+    pub(crate) fn plane_at(&self, x: usize, y: usize) -> InversePlane {
+        self.pixel_plane(x, y).moved(CENTRE.0 - x as f32, CENTRE.1 - y as f32)
+    }
+
+    /// The plane of pixel `(x, y)` of the tile, anchored there.
+    pub(crate) fn pixel_plane(&self, x: usize, y: usize) -> InversePlane {
+        let b = &self.belief;
+        InversePlane { w: b.w[y][x], wx: b.wx[y][x], wy: b.wy[y][x] }
+    }
+
+    /// Copies texels and estimates of the tile at `(x0, y0)` from the level and its state.
+    pub(crate) fn load(&mut self, level: &Level, state: &State, x0: i32, y0: i32) {
+        (self.x0, self.y0) = (x0, y0);
+        for (r, row) in self.patch.texel.iter_mut().enumerate() {
+            let (x, y) = (x0 - REACH as i32, y0 - REACH as i32 + r as i32);
+            row.copy_from_slice(level.reference.window(x, y, WIN_W));
+        }
+        let b = &mut self.belief;
+        for y in 0..TILE_H {
+            let at = state.at(x0, y0 + y as i32);
+            let cut = at..at + TILE_W;
+            b.w[y].copy_from_slice(&state.w[cut.clone()]);
+            b.wx[y].copy_from_slice(&state.wx[cut.clone()]);
+            b.wy[y].copy_from_slice(&state.wy[cut.clone()]);
+            b.data[y].copy_from_slice(&state.cost[cut.clone()]);
+            b.prior_w[y].copy_from_slice(&state.prior[cut.clone()]);
+            b.active[y].copy_from_slice(&state.active[cut]);
+        }
+        for y in 0..TILE_H + 2 {
+            let at = state.at(x0 - 1, y0 - 1 + y as i32);
+            self.halo.w[y].copy_from_slice(&state.w[at..at + WIN_W]);
+            self.halo.nx[y].copy_from_slice(&state.wx[at..at + WIN_W]);
+            self.halo.ny[y].copy_from_slice(&state.wy[at..at + WIN_W]);
+            self.halo.on[y].copy_from_slice(&state.active[at..at + WIN_W]);
+        }
+    }
+
+    /// Writes the estimates back.
+    pub(crate) fn store(&self, state: &mut State) {
+        let b = &self.belief;
+        for y in 0..TILE_H {
+            let at = state.at(self.x0, self.y0 + y as i32);
+            let cut = at..at + TILE_W;
+            state.w[cut.clone()].copy_from_slice(&b.w[y]);
+            state.wx[cut.clone()].copy_from_slice(&b.wx[y]);
+            state.wy[cut.clone()].copy_from_slice(&b.wy[y]);
+            state.cost[cut.clone()].copy_from_slice(&b.data[y]);
+            state.total[cut].copy_from_slice(&b.total[y]);
+        }
+    }
+}
