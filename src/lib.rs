@@ -10,7 +10,7 @@ pub mod geometry;
 pub mod progress;
 pub mod scene;
 pub mod semantics;
-pub mod store;
 pub mod stereo;
+pub mod store;
 
 pub use error::{Error, Result};

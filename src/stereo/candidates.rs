@@ -48,7 +48,13 @@ pub(crate) fn spread(first: usize, k: usize) -> usize {
 }
 
 /// The best of four pixels drawn beside the tile on side `k % 4`, as a plane at the tile's centre.
-pub(crate) fn beside(level: &Level, state: &State, tile: &Tile, k: usize, rng: &mut Rng) -> Option<InversePlane> {
+pub(crate) fn beside(
+    level: &Level,
+    state: &State,
+    tile: &Tile,
+    k: usize,
+    rng: &mut Rng,
+) -> Option<InversePlane> {
     let reach = if k < 4 { 6 } else { 24 };
     let (tw, th) = (TILE_W as i32, TILE_H as i32);
     let mut best: Option<(i32, i32, f32)> = None;
@@ -85,12 +91,23 @@ pub(crate) fn random(level: &Level, rng: &mut Rng) -> InversePlane {
 }
 
 /// The plane of pixel `(x, y)`, shaken about that pixel, anchored at the tile's centre. `strength` 1 is the widest.
-pub(crate) fn shaken(level: &Level, tile: &Tile, x: usize, y: usize, strength: f32, rng: &mut Rng) -> InversePlane {
+pub(crate) fn shaken(
+    level: &Level,
+    tile: &Tile,
+    x: usize,
+    y: usize,
+    strength: f32,
+    rng: &mut Rng,
+) -> InversePlane {
     let p = tile.pixel_plane(x, y);
     let shift = strength * SHIFT_RANGE / level.pixels_per_w;
     let slope = strength * SLOPE_RANGE / level.pixels_per_w;
-    InversePlane { w: p.w + shift * rng.signed(), wx: p.wx + slope * rng.signed(), wy: p.wy + slope * rng.signed() }
-        .moved(CENTRE.0 - x as f32, CENTRE.1 - y as f32)
+    InversePlane {
+        w: p.w + shift * rng.signed(),
+        wx: p.wx + slope * rng.signed(),
+        wy: p.wy + slope * rng.signed(),
+    }
+    .moved(CENTRE.0 - x as f32, CENTRE.1 - y as f32)
 }
 
 /// The plane fitted by least squares to the inverse depths around pixel `(x, y)` that lie near its own plane,

@@ -4,7 +4,7 @@ use super::plane::Pinhole;
 use super::problem::{SourceImage, StereoProblem};
 use super::tile::{REACH, TILE_W, WIN_W};
 use crate::geometry::{Camera, Size};
-use crate::scene::resample::resize_gray;
+use crate::scene::resize_gray;
 use crate::scene::{DepthEstimate, GrayImage};
 use nalgebra::{Matrix3, Vector3};
 

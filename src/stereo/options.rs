@@ -53,7 +53,10 @@ impl StereoOptions {
             }
         }
         if !(self.keep_cost > 0.0 && self.keep_cost <= 2.0) {
-            return Err(Error::invalid(format!("keep cost is {}; it must be above 0, at most 2", self.keep_cost)));
+            return Err(Error::invalid(format!(
+                "keep cost is {}; it must be above 0, at most 2",
+                self.keep_cost
+            )));
         }
         if !(self.geometric_weight >= 0.0 && self.geometric_weight.is_finite()) {
             return Err(Error::invalid(format!(

@@ -1,7 +1,7 @@
 //! One view to estimate and what it is matched with.
 
 use crate::geometry::Camera;
-use crate::scene::{Grid, GrayImage, ImageId};
+use crate::scene::{GrayImage, Grid, ImageId};
 use std::sync::Arc;
 
 /// A grey image with its camera at the size of that image.

@@ -49,7 +49,8 @@ mod tests {
     fn same_key_same_sequence_and_other_key_another() {
         let take = |mut r: Rng| -> Vec<f32> { (0..8).map(|_| r.unit()).collect() };
         assert_eq!(take(Rng::keyed(1, 2, 3, 4)), take(Rng::keyed(1, 2, 3, 4)));
-        for other in [Rng::keyed(0, 2, 3, 4), Rng::keyed(1, 3, 3, 4), Rng::keyed(1, 2, 4, 4), Rng::keyed(1, 2, 3, 5)]
+        for other in
+            [Rng::keyed(0, 2, 3, 4), Rng::keyed(1, 3, 3, 4), Rng::keyed(1, 2, 4, 4), Rng::keyed(1, 2, 3, 5)]
         {
             assert_ne!(take(Rng::keyed(1, 2, 3, 4)), take(other));
         }

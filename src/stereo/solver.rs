@@ -109,7 +109,9 @@ impl<'a> Solver<'a> {
     }
 
     fn shake(&mut self, pass: Pass, first: usize, k: usize, rng: &mut Rng) {
-        let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k)) else { return };
+        let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k)) else {
+            return;
+        };
         if cost > 1.5 {
             return;
         }
@@ -120,7 +122,9 @@ impl<'a> Solver<'a> {
     }
 
     fn fit(&mut self, first: usize, k: usize) {
-        let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k)) else { return };
+        let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k)) else {
+            return;
+        };
         let radius = if k % 2 == 0 { 3 } else { 5 };
         if cost <= 1.0
             && let Some(p) = candidates::fitted(self.level, &self.tile, x, y, radius)

@@ -5,8 +5,8 @@
 use super::super::level::{Level, Source, SourceGeometry};
 use super::super::plane::InversePlane;
 use super::super::tile::{
-    Belief, CENTRE, Halo, Patch, REACH, ROBUST_COST, Row, Scratch, TAPS, TILE_H, TILE_W, Tile, UNSEEN, WIN_H, WIN_W,
-    WinRow,
+    Belief, CENTRE, Halo, Patch, REACH, ROBUST_COST, Row, Scratch, TAPS, TILE_H, TILE_W, Tile, UNSEEN, WIN_H,
+    WIN_W, WinRow,
 };
 use super::math::{exp, fraction_and_index};
 
@@ -47,10 +47,8 @@ fn cut(row: &WinRow, at: usize) -> &Row {
 pub(super) fn prepare(tile: &mut Tile, level: &Level) {
     let (w, h) = (level.size.width as i32, level.size.height as i32);
     let (x0, y0, reach) = (tile.x0, tile.y0, REACH as i32);
-    let interior = x0 >= reach
-        && y0 >= reach
-        && x0 + (TILE_W as i32) + reach <= w
-        && y0 + (TILE_H as i32) + reach <= h;
+    let interior =
+        x0 >= reach && y0 >= reach && x0 + (TILE_W as i32) + reach <= w && y0 + (TILE_H as i32) + reach <= h;
     let mut inside = [[1.0f32; WIN_W]; WIN_H];
     if !interior {
         for (r, row) in inside.iter_mut().enumerate() {
@@ -196,31 +194,48 @@ fn warp(source: &Source, x0: i32, y0: i32, plane: InversePlane, scratch: &mut Sc
     if coverage == Coverage::None {
         return coverage;
     }
-    let whole = coverage == Coverage::Whole;
     for r in 0..WIN_H {
-        let oy = r as f32 - (WIN_H as f32 - 1.0) / 2.0;
-        let (mut fu, mut fv, mut index, mut quad) = ([0f32; WIN_W], [0f32; WIN_W], [0u32; WIN_W], [0u64; WIN_W]);
-        for c in 0..WIN_W {
-            let ox = c as f32 - (WIN_W as f32 - 1.0) / 2.0;
-            let (u, v, _) = m.at(ox, oy);
-            let (ku, kv) = (u.max(1.0).min(max_u), v.max(1.0).min(max_v));
-            if !whole {
-                scratch.valid[r][c] = if ku == u && kv == v { 1.0 } else { 0.0 };
-            }
-            let (iu, iv);
-            (fu[c], iu) = fraction_and_index(ku);
-            (fv[c], iv) = fraction_and_index(kv);
-            index[c] = iv.wrapping_mul(source.width as u32).wrapping_add(iu);
-        }
-        for c in 0..WIN_W {
-            quad[c] = source.quads.get(index[c] as usize).copied().unwrap_or(0);
-        }
-        let out = &mut scratch.warped[r];
-        for c in 0..WIN_W {
-            out[c] = bilinear(quad[c], fu[c], fv[c]);
+        if coverage == Coverage::Whole {
+            warp_row::<true>(source, &m, r, max_u, max_v, scratch);
+        } else {
+            warp_row::<false>(source, &m, r, max_u, max_v, scratch);
         }
     }
     coverage
+}
+
+/// Samples one row of the window; unless the `WHOLE` window is inside, samples are clamped and marked.
+#[inline(always)]
+fn warp_row<const WHOLE: bool>(
+    source: &Source,
+    m: &Warp,
+    r: usize,
+    max_u: f32,
+    max_v: f32,
+    scratch: &mut Scratch,
+) {
+    let oy = r as f32 - (WIN_H as f32 - 1.0) / 2.0;
+    let (mut fu, mut fv, mut index, mut quad) = ([0f32; WIN_W], [0f32; WIN_W], [0u32; WIN_W], [0u64; WIN_W]);
+    for c in 0..WIN_W {
+        let ox = c as f32 - (WIN_W as f32 - 1.0) / 2.0;
+        let (mut u, mut v, _) = m.at(ox, oy);
+        if !WHOLE {
+            let (ku, kv) = (u.max(1.0).min(max_u), v.max(1.0).min(max_v));
+            scratch.valid[r][c] = if ku == u && kv == v { 1.0 } else { 0.0 };
+            (u, v) = (ku, kv);
+        }
+        let (iu, iv);
+        (fu[c], iu) = fraction_and_index(u);
+        (fv[c], iv) = fraction_and_index(v);
+        index[c] = iv.wrapping_mul(source.width as u32).wrapping_add(iu);
+    }
+    for c in 0..WIN_W {
+        quad[c] = source.quads.get(index[c] as usize).copied().unwrap_or(0);
+    }
+    let out = &mut scratch.warped[r];
+    for c in 0..WIN_W {
+        out[c] = bilinear(quad[c], fu[c], fv[c]);
+    }
 }
 
 #[inline(always)]
@@ -236,16 +251,16 @@ fn bilinear(quad: u64, fu: f32, fv: f32) -> f32 {
 #[inline(always)]
 fn zncc_row(patch: &Patch, warped: &[WinRow; WIN_H], y: usize) -> Row {
     let (mut sum, mut square, mut cross) = (ZERO, ZERO, ZERO);
-    for tap in 0..TAPS {
-        let (i, j) = (tap / 5 * 2, tap % 5 * 2);
-        let v = cut(&warped[y + i], j);
-        let t = cut(&patch.texel[y + i], j);
-        let w = &patch.weight[y][tap];
-        for x in 0..TILE_W {
-            let vw = v[x] * w[x];
-            sum[x] += vw;
-            square[x] += v[x] * vw;
-            cross[x] += t[x] * vw;
+    for i in 0..5 {
+        let (warped, texel) = (&warped[y + 2 * i], &patch.texel[y + 2 * i]);
+        for j in 0..5 {
+            let (v, t, w) = (cut(warped, 2 * j), cut(texel, 2 * j), &patch.weight[y][5 * i + j]);
+            for x in 0..TILE_W {
+                let vw = v[x] * w[x];
+                sum[x] += vw;
+                square[x] += v[x] * vw;
+                cross[x] += t[x] * vw;
+            }
         }
     }
     finish_zncc(patch, y, &sum, &square, &cross)
@@ -298,8 +313,12 @@ fn data_cost(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
             let mut cost = zncc_row(patch, &scratch.warped, y);
             if coverage == Coverage::Part {
                 let v = &scratch.valid;
-                let corners =
-                    [cut(&v[y], 0), cut(&v[y], 2 * REACH), cut(&v[y + 2 * REACH], 0), cut(&v[y + 2 * REACH], 2 * REACH)];
+                let corners = [
+                    cut(&v[y], 0),
+                    cut(&v[y], 2 * REACH),
+                    cut(&v[y + 2 * REACH], 0),
+                    cut(&v[y + 2 * REACH], 2 * REACH),
+                ];
                 for x in 0..TILE_W {
                     let all = corners[0][x] * corners[1][x] * corners[2][x] * corners[3][x];
                     cost[x] = if all > 0.5 { cost[x] } else { ROBUST_COST };
@@ -410,7 +429,8 @@ fn accept(belief: &mut Belief, scratch: &Scratch, p: InversePlane, low: f32, hig
     for y in 0..TILE_H {
         let data = merged(&scratch.best[y], &scratch.second[y]);
         let s = &scratch.smooth;
-        let (left, right, up, down) = (cut(&s[y + 1], 0), cut(&s[y + 1], 2), cut(&s[y], 1), cut(&s[y + 2], 1));
+        let (left, right, up, down) =
+            (cut(&s[y + 1], 0), cut(&s[y + 1], 2), cut(&s[y], 1), cut(&s[y + 2], 1));
         let mut any = ZERO;
         for x in 0..TILE_W {
             let w = p.w + p.wy * (y as f32 - CENTRE.1) + p.wx * (x as f32 - CENTRE.0);
@@ -486,7 +506,9 @@ fn totals(tile: &mut Tile, level: &Level) {
     for y in 0..TILE_H {
         let row = (tile.y0 + y as i32) as f32;
         let mut smooth = [1.0f32; TILE_W];
-        for (r, c, sx, sy) in [(y + 1, 0, -1.0, 0.0), (y + 1, 2, 1.0, 0.0), (y, 1, 0.0, -1.0), (y + 2, 1, 0.0, 1.0)] {
+        for (r, c, sx, sy) in
+            [(y + 1, 0, -1.0, 0.0), (y + 1, 2, 1.0, 0.0), (y, 1, 0.0, -1.0), (y + 2, 1, 0.0, 1.0)]
+        {
             let (nx, ny, nz) = (cut(&halo.nx[r], c), cut(&halo.ny[r], c), cut(&halo.nz[r], c));
             let (nw, on) = (cut(&halo.w[r], c), cut(&halo.on[r], c));
             for x in 0..TILE_W {
@@ -498,8 +520,13 @@ fn totals(tile: &mut Tile, level: &Level) {
             }
         }
         for x in 0..TILE_W {
-            belief.total[y][x] =
-                total_cost(belief.data[y][x], smooth[x], belief.w[y][x], belief.prior_w[y][x], belief.prior_k[y][x]);
+            belief.total[y][x] = total_cost(
+                belief.data[y][x],
+                smooth[x],
+                belief.w[y][x],
+                belief.prior_w[y][x],
+                belief.prior_k[y][x],
+            );
         }
     }
 }
