@@ -2,6 +2,8 @@
 
 pub mod atomic;
 mod byte_cache;
+mod depth_map;
+pub mod depth_store;
 pub mod images;
 mod jpeg;
 mod label_png;
