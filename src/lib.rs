@@ -5,6 +5,7 @@
 
 pub mod depth_filter;
 mod error;
+pub mod evaluate;
 pub mod fusion;
 pub mod geometry;
 pub mod progress;
