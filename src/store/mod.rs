@@ -10,3 +10,4 @@ mod label_png;
 pub mod labels;
 pub mod masks;
 pub mod paths;
+pub mod spool;
