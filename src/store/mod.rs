@@ -2,6 +2,8 @@
 
 pub mod atomic;
 mod byte_cache;
+pub mod cloud;
+mod cloud_names;
 mod depth_map;
 pub mod depth_store;
 pub mod images;
