@@ -9,6 +9,7 @@ pub mod evaluate;
 pub mod fusion;
 pub mod geometry;
 pub mod progress;
+pub mod report;
 pub mod scene;
 pub mod semantics;
 pub mod stereo;
