@@ -1,7 +1,5 @@
 //! Depth maps: real and synthetic files.
 
-#![allow(clippy::unwrap_used)]
-
 mod common;
 
 use common::{damage, fixture, shared, small_limits};

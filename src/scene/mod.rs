@@ -5,6 +5,8 @@ mod grid;
 mod ids;
 mod maps;
 mod model;
+mod neighbor_scores;
+mod neighbors;
 mod resample;
 mod resolution;
 #[cfg(test)]
@@ -15,6 +17,7 @@ pub use grid::Grid;
 pub use ids::{ImageId, ViewIndex};
 pub use maps::{ColorImage, ConfidenceMap, DepthEstimate, DepthMap, GrayImage, LabelMap, NormalMap};
 pub use model::{Calibration, Neighbor, Scene, Tracks, View};
+pub use neighbors::{NeighborOptions, OutsideRoi, ViewNeighbors, override_neighbors, select_neighbors};
 pub(crate) use resample::area_rgb;
 pub use resample::{area_color, gray_from_color, resize_gray, resize_nearest};
 pub use resolution::{ResolutionOptions, scaled_size};

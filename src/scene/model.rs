@@ -93,7 +93,7 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    /// Appends a point with the views that see it (sorted here, duplicates dropped).
+    /// Appends a point with the views that see it (sorted here). A view may observe a point twice; both count.
     pub fn push(&mut self, point: [f32; 3], visibility: impl IntoIterator<Item = ViewIndex>) {
         if self.offsets.is_empty() {
             self.offsets.push(0);
@@ -101,15 +101,7 @@ impl Tracks {
         let start = self.views.len();
         self.views.extend(visibility);
         self.views[start..].sort_unstable();
-        let mut end = start;
-        for i in start..self.views.len() {
-            if i == start || self.views[i] != self.views[end - 1] {
-                self.views[end] = self.views[i];
-                end += 1;
-            }
-        }
-        self.views.truncate(end);
-        self.offsets.push(end);
+        self.offsets.push(self.views.len());
         self.points.push(point);
     }
 
@@ -128,7 +120,7 @@ impl Tracks {
         self.points[i]
     }
 
-    /// Views that see point `i`, ascending.
+    /// Views that see point `i`, ascending; a view that observed it twice is there twice.
     pub fn visibility(&self, i: usize) -> &[ViewIndex] {
         &self.views[self.offsets[i]..self.offsets[i + 1]]
     }

@@ -2,14 +2,14 @@
 
 pub mod atomic;
 mod byte_cache;
-pub mod cloud;
-mod cloud_names;
+pub mod cameras;
 mod depth_map;
 pub mod depth_store;
+pub mod export;
 pub mod images;
+pub mod import;
 mod jpeg;
 mod label_png;
 pub mod labels;
 pub mod masks;
 pub mod paths;
-pub mod spool;

@@ -1,5 +1,5 @@
 //! Where the test files are.
-#![allow(clippy::print_stdout, dead_code)]
+#![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 

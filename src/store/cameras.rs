@@ -1,0 +1,93 @@
+//! The cameras at working resolution, and which views can be used at all.
+
+use super::images::image_size;
+use super::import::LoadedScene;
+use crate::error::{Error, Result};
+use crate::geometry::{Camera, Size};
+use crate::scene::{Calibration, ResolutionOptions, ViewIndex};
+use rayon::prelude::*;
+use tracing::warn;
+
+/// The camera of every view at the size at which its photograph is processed; `None` for uncalibrated images and for
+/// those whose photograph is missing, unreadable or of another shape than the scene says, which a warning names.
+/// Only the headers of the photographs are read.
+///
+/// # Errors
+/// [`Error`] if fewer than two views can be used, or if `strict` and a photograph cannot.
+pub fn working_cameras(
+    loaded: &LoadedScene,
+    resolution: &ResolutionOptions,
+    strict: bool,
+) -> Result<Vec<Option<Camera>>> {
+    resolution.check()?;
+    let views = &loaded.scene.views;
+    let cameras: Vec<Option<Result<Camera>>> = (0..views.len())
+        .into_par_iter()
+        .map(|i| {
+            let calibration = views[i].calibration.as_ref()?;
+            Some(working_camera(loaded, ViewIndex(i as u32), calibration, resolution))
+        })
+        .collect();
+    let mut usable = Vec::with_capacity(cameras.len());
+    for (i, camera) in cameras.into_iter().enumerate() {
+        usable.push(match camera {
+            Some(Ok(camera)) => Some(camera),
+            Some(Err(error)) if strict => return Err(error),
+            Some(Err(error)) => {
+                warn!("{error}; view {i} is left out");
+                None
+            }
+            None => None,
+        });
+    }
+    let count = usable.iter().flatten().count();
+    if count < 2 {
+        let what = format!(
+            "{count} of its {} images can be used: at least two with a pose and a readable file are needed; image \
+             names are relative to the working folder",
+            views.len()
+        );
+        return Err(Error::content(&loaded.path, what));
+    }
+    Ok(usable)
+}
+
+fn working_camera(
+    loaded: &LoadedScene,
+    view: ViewIndex,
+    calibration: &Calibration,
+    resolution: &ResolutionOptions,
+) -> Result<Camera> {
+    let path = loaded.image_path(view);
+    let size = image_size(&path)?;
+    if let Some(stated) = calibration.size.filter(|&stated| !same_shape(stated, size)) {
+        let what =
+            format!("{size} pixels, but the scene says {stated}: was it rotated, cropped or replaced?");
+        return Err(Error::content(&path, what));
+    }
+    Ok(calibration.camera_at(resolution.working_size(size)))
+}
+
+/// Whether `file` is `stated` at another scale, given that either may have been rounded to whole pixels.
+fn same_shape(stated: Size, file: Size) -> bool {
+    let factor = f64::from(file.longest()) / f64::from(stated.longest());
+    let tolerance = 0.5 * factor.max(1.0) + 1.0;
+    let agrees = |s: u32, f: u32| (f64::from(s) * factor - f64::from(f)).abs() <= tolerance;
+    agrees(stated.width, file.width) && agrees(stated.height, file.height)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_agree_up_to_rounding() {
+        let size = Size::new;
+        assert!(same_shape(size(640, 479), size(640, 479)));
+        assert!(same_shape(size(80, 60), size(640, 479)));
+        assert!(same_shape(size(640, 479), size(80, 60)));
+        assert!(!same_shape(size(640, 479), size(479, 640)));
+        assert!(!same_shape(size(640, 480), size(640, 470)));
+        assert!(!same_shape(size(640, 480), size(600, 480)));
+    }
+}

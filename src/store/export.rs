@@ -1,0 +1,153 @@
+//! From the scene back to a `.mvs` file.
+
+use super::atomic::AtomicFile;
+use super::import::LoadedScene;
+use super::paths::{SearchPath, clean_name, name_relative_to};
+use crate::error::{Error, Result};
+use crate::geometry::{Camera, Roi};
+use crate::scene::{Neighbor, Scene, ViewNeighbors};
+use semvs_formats::mvs::{self, NEWEST_VERSION, NO_ID};
+use std::path::Path;
+
+/// The archive that OpenMVS leaves after densification in interface mode: the sparse points as they were, cameras
+/// at working resolution, neighbour scores, the region of interest. Image names are relative to the working folder.
+///
+/// Names of platforms and cameras, lines and the transform are dropped, as OpenMVS does. `cameras` (`None` = not
+/// processed: the stored camera stays) and `neighbors` have one entry per view.
+pub fn interface_archive(
+    loaded: &LoadedScene,
+    cameras: &[Option<Camera>],
+    neighbors: &[ViewNeighbors],
+) -> mvs::Scene {
+    let mut archive = mvs::Scene {
+        platforms: export_platforms(&loaded.archive, cameras),
+        images: loaded.archive.images.clone(),
+        points: loaded.archive.points.clone(),
+        obb: loaded.scene.roi.as_ref().map(export_roi),
+        ..mvs::Scene::default()
+    };
+    sort_views(&mut archive.points.views);
+    for (i, image) in archive.images.iter_mut().enumerate() {
+        export_image(image, &loaded.scene, i, &loaded.search);
+        if let Some(neighbors) = neighbors.get(i) {
+            image.avg_depth = neighbors.avg_depth;
+            image.view_scores = neighbors.all.iter().map(export_neighbor).collect();
+        }
+    }
+    archive
+}
+
+/// Writes an interface archive of the newest version, whole or not at all.
+///
+/// # Errors
+/// [`Error`] if the place cannot be written or the archive has an index out of range.
+pub fn write_interface(path: &Path, archive: &mvs::Scene) -> Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    mvs::write_interface(&mut file, archive, NEWEST_VERSION).map_err(|e| Error::format(path, e))?;
+    file.commit()
+}
+
+/// The platforms without names; each camera with the size and intrinsics of the first processed view that uses it.
+fn export_platforms(archive: &mvs::Scene, cameras: &[Option<Camera>]) -> Vec<mvs::Platform> {
+    let mut platforms = archive.platforms.clone();
+    let mut used: Vec<Vec<bool>> = platforms.iter().map(|p| vec![false; p.cameras.len()]).collect();
+    let calibrated = archive.images.iter().zip(cameras).filter(|(image, _)| image.pose != NO_ID);
+    for processed in [true, false] {
+        for (image, camera) in calibrated.clone().filter(|(_, camera)| camera.is_some() == processed) {
+            let (p, c) = (image.platform as usize, image.camera as usize);
+            let Some(stored) = platforms.get_mut(p).and_then(|platform| platform.cameras.get_mut(c)) else {
+                continue;
+            };
+            if std::mem::replace(&mut used[p][c], true) {
+                continue;
+            }
+            if let Some(camera) = camera {
+                (stored.width, stored.height) = (camera.size().width, camera.size().height);
+                let rows = camera.k().transpose();
+                stored.k.copy_from_slice(rows.as_slice());
+            }
+        }
+    }
+    for (platform, used) in platforms.iter_mut().zip(&used) {
+        platform.name.clear();
+        for (camera, &used) in platform.cameras.iter_mut().zip(used) {
+            camera.name.clear();
+            camera.band.clear();
+            if !used {
+                camera.k = camera.normalized_k();
+                (camera.width, camera.height) = (0, 0);
+            }
+        }
+    }
+    platforms
+}
+
+/// Names, IDs and depths of image `index` as OpenMVS writes them.
+fn export_image(image: &mut mvs::Image, scene: &Scene, index: usize, search: &SearchPath) {
+    image.name = export_name(&image.name, search);
+    image.mask_name = export_name(&image.mask_name, search);
+    image.id = scene.views[index].id.0;
+    (image.min_depth, image.max_depth) = (0.0, 0.0);
+    (image.width, image.height) = (0, 0);
+    if image.pose == NO_ID {
+        (image.platform, image.camera) = (NO_ID, NO_ID);
+    }
+}
+
+/// A stored name relative to the working folder; bytes that are no text stay as they are.
+fn export_name(stored: &[u8], search: &SearchPath) -> Vec<u8> {
+    let Ok(text) = std::str::from_utf8(stored) else { return stored.to_vec() };
+    if text.is_empty() {
+        return Vec::new();
+    }
+    let name = clean_name(text);
+    let found = search.find(&name);
+    let is_beside = !Path::new(&name).is_absolute() && found == search.working_folder.join(&name);
+    if is_beside { name.into_bytes() } else { name_relative_to(&found, &search.working_folder).into_bytes() }
+}
+
+fn export_neighbor(neighbor: &Neighbor) -> mvs::ViewScore {
+    mvs::ViewScore {
+        image: neighbor.view.0,
+        points: neighbor.points,
+        scale: neighbor.scale,
+        angle: neighbor.angle,
+        area: neighbor.area,
+        score: neighbor.score,
+    }
+}
+
+/// Sorts the views of every point with their confidences; confidences that are all 0 are dropped.
+fn sort_views(views: &mut mvs::Visibility) {
+    if views.weights.iter().all(|&w| w == 0.0) {
+        views.weights.clear();
+    }
+    let mut pairs = Vec::new();
+    for point in 0..views.len() {
+        let range = views.range(point);
+        let images = &mut views.images[range.clone()];
+        if images.is_sorted() {
+            continue;
+        }
+        if views.weights.is_empty() {
+            images.sort_unstable();
+            continue;
+        }
+        let weights = &mut views.weights[range];
+        pairs.clear();
+        pairs.extend(images.iter().copied().zip(weights.iter().copied()));
+        pairs.sort_by_key(|&(image, _)| image);
+        for (i, &(image, weight)) in pairs.iter().enumerate() {
+            (images[i], weights[i]) = (image, weight);
+        }
+    }
+}
+
+fn export_roi(roi: &Roi) -> mvs::Obb {
+    let mut rotation = [0.0; 9];
+    rotation.copy_from_slice(roi.rotation.transpose().as_slice());
+    mvs::Obb { rotation, center: roi.center.into(), half_extent: roi.half_extent.into() }
+}
+
+#[cfg(test)]
+mod tests;

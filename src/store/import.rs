@@ -1,0 +1,217 @@
+//! From a `.mvs` file to the scene that every stage sees.
+
+use super::images::image_size;
+use super::paths::{SearchPath, clean_name};
+use crate::error::{Error, Result};
+use crate::geometry::{Roi, Size, normalized_k};
+use crate::scene::{Calibration, ImageId, Neighbor, Scene, Tracks, View, ViewIndex};
+use nalgebra::{Matrix3, Vector3};
+use semvs_formats::Limits;
+use semvs_formats::mvs::{self, NO_ID, SceneFile};
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use tracing::warn;
+
+/// A scene and what its file said beyond it.
+#[derive(Clone, Debug)]
+pub struct LoadedScene {
+    /// What the stages work on.
+    pub scene: Scene,
+    /// What the file held; exports start from it. Its images are those of [`Scene::views`], in the same order.
+    pub archive: mvs::Scene,
+    /// Which archive the file is.
+    pub container: mvs::Container,
+    /// The scene file.
+    pub path: PathBuf,
+    /// Where the scene's names are looked for.
+    pub search: SearchPath,
+}
+
+impl LoadedScene {
+    /// The photograph of a view.
+    pub fn image_path(&self, view: ViewIndex) -> PathBuf {
+        self.search.find(&self.scene.views[view.index()].name)
+    }
+}
+
+/// Loads the scene file at `path`. Names in it are relative to `working_folder` (empty = the current folder) or,
+/// failing that, to the folder of the file.
+///
+/// What can be left out without harm is, with a warning: sparse points at no finite place, views of points that name
+/// no calibrated image, neighbour scores that are no numbers. Duplicate global IDs are renumbered.
+///
+/// # Errors
+/// [`Error`] if the file cannot be read, a calibrated image has impossible camera data, or fewer than two images
+/// are calibrated.
+pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result<LoadedScene> {
+    let file = SceneFile::read(path, limits).map_err(|e| Error::format(path, e))?;
+    let (archive, container) = (file.scene, file.container);
+    archive.check().map_err(|e| Error::format(path, e))?;
+    let search = SearchPath::new(working_folder, path);
+    let views = import_views(path, &archive, container, &search)?;
+    let calibrated = views.iter().filter(|v| v.calibration.is_some()).count();
+    if calibrated < 2 {
+        let what = format!(
+            "{calibrated} of its {} images have a pose: at least two are needed; orient the photographs first",
+            views.len()
+        );
+        return Err(Error::content(path, what));
+    }
+    let tracks = import_tracks(path, &archive, &views);
+    let roi = archive.obb.as_ref().map(import_roi);
+    let scene = Scene { views, tracks, roi };
+    Ok(LoadedScene { scene, archive, container, path: path.to_owned(), search })
+}
+
+/// The views in file order.
+fn import_views(
+    path: &Path,
+    archive: &mvs::Scene,
+    container: mvs::Container,
+    search: &SearchPath,
+) -> Result<Vec<View>> {
+    let ids = unique_ids(path, &archive.images);
+    let mut views = Vec::with_capacity(archive.images.len());
+    for (i, image) in archive.images.iter().enumerate() {
+        let name = clean_name(&String::from_utf8_lossy(&image.name));
+        let mask =
+            (!image.mask_name.is_empty()).then(|| clean_name(&String::from_utf8_lossy(&image.mask_name)));
+        let calibration = match import_calibration(archive, image) {
+            Some(mut calibration) => {
+                if calibration.size.is_none() {
+                    size_from_file(&mut calibration, container, &search.find(&name));
+                }
+                Some(calibration)
+            }
+            None if image.pose == NO_ID => None,
+            None => {
+                return Err(Error::content(
+                    path,
+                    format!("image {i} ({name}) names a camera that is not there"),
+                ));
+            }
+        };
+        let neighbors = import_neighbors(archive, i);
+        let avg_depth = if image.avg_depth.is_finite() { image.avg_depth.max(0.0) } else { 0.0 };
+        views.push(View { name, mask, id: ImageId(ids[i]), calibration, neighbors, avg_depth });
+    }
+    Ok(views)
+}
+
+/// Pose and intrinsics of an image: `R = Rc Rp`, `C = Rpᵀ Cc + Cp`; `None` if it is uncalibrated or an index is
+/// out of range.
+fn import_calibration(archive: &mvs::Scene, image: &mvs::Image) -> Option<Calibration> {
+    if image.pose == NO_ID {
+        return None;
+    }
+    let platform = archive.platforms.get(image.platform as usize)?;
+    let camera = platform.cameras.get(image.camera as usize)?;
+    let pose = platform.poses.get(image.pose as usize)?;
+    let pose_rotation = Matrix3::from_row_slice(&pose.rotation);
+    let rotation = Matrix3::from_row_slice(&camera.rotation) * pose_rotation;
+    let center = pose_rotation.transpose() * Vector3::from(camera.center) + Vector3::from(pose.center);
+    let k = Matrix3::from_row_slice(&camera.k);
+    let size = (camera.width > 0 && camera.height > 0).then(|| Size::new(camera.width, camera.height));
+    let normalized_k = size.map_or(k, |size| normalized_k(&k, size));
+    Some(Calibration { normalized_k, rotation, center, size })
+}
+
+/// Fills in the size of a camera that was stored without one, and undoes the older way of normalising the principal
+/// point, `c / max(w, h)` without half-pixel terms, which files up to version 5 may use.
+fn size_from_file(calibration: &mut Calibration, container: mvs::Container, image: &Path) {
+    /// A principal point is near 0.5 by the older rule and near 0 by the newer one.
+    const OLDER_RULE: f64 = 0.3;
+    let size = match image_size(image) {
+        Ok(size) => size,
+        Err(error) => return warn!("{error}; its size is not in the scene either"),
+    };
+    calibration.size = Some(size);
+    let k = &mut calibration.normalized_k;
+    let is_old = matches!(container, mvs::Container::Interface { version } if version <= 5);
+    if is_old && k[(0, 2)] > OLDER_RULE && k[(1, 2)] > OLDER_RULE {
+        let shift = 0.5 / f64::from(size.longest()) - 0.5;
+        k[(0, 2)] += shift;
+        k[(1, 2)] += shift;
+    }
+}
+
+/// Global IDs, the local index where there is none; later ones of equal IDs get the next free number.
+fn unique_ids(path: &Path, images: &[mvs::Image]) -> Vec<u32> {
+    let stated = |(i, image): (usize, &mvs::Image)| if image.id == NO_ID { i as u32 } else { image.id };
+    let mut ids: Vec<u32> = images.iter().enumerate().map(stated).collect();
+    let mut taken: HashSet<u32> = ids.iter().copied().collect();
+    let mut seen = HashSet::with_capacity(ids.len());
+    let mut next = 0;
+    for (i, id) in ids.iter_mut().enumerate() {
+        if seen.insert(*id) {
+            continue;
+        }
+        while taken.contains(&next) {
+            next += 1;
+        }
+        warn!("{}: image {i} has the ID {id} of another image; it becomes {next}", path.display());
+        taken.insert(next);
+        *id = next;
+    }
+    ids
+}
+
+/// The stored neighbours of image `index`, as they are but for those that cannot be used.
+fn import_neighbors(archive: &mvs::Scene, index: usize) -> Vec<Neighbor> {
+    let usable = |s: &&mvs::ViewScore| {
+        let calibrated = archive.images.get(s.image as usize).is_some_and(|other| other.pose != NO_ID);
+        calibrated
+            && s.image as usize != index
+            && [s.scale, s.angle, s.area, s.score].iter().all(|v| v.is_finite())
+    };
+    let neighbor = |s: &mvs::ViewScore| Neighbor {
+        view: ViewIndex(s.image),
+        points: s.points,
+        scale: s.scale,
+        angle: s.angle,
+        area: s.area,
+        score: s.score,
+    };
+    archive.images[index].view_scores.iter().filter(usable).map(neighbor).collect()
+}
+
+/// The sparse points with the calibrated views that see them.
+fn import_tracks(path: &Path, archive: &mvs::Scene, views: &[View]) -> Tracks {
+    let mut tracks = Tracks::default();
+    let (mut bad_points, mut bad_views) = (0usize, 0usize);
+    for (i, point) in archive.points.positions.iter().enumerate() {
+        if !point.iter().all(|c| c.is_finite()) {
+            bad_points += 1;
+            continue;
+        }
+        let seen_by = archive.points.views.images_of(i).iter().filter_map(|&v| {
+            let calibrated = views.get(v as usize).is_some_and(|view| view.calibration.is_some());
+            bad_views += usize::from(!calibrated);
+            calibrated.then_some(ViewIndex(v))
+        });
+        tracks.push(*point, seen_by);
+    }
+    if bad_points > 0 {
+        warn!("{}: {bad_points} sparse points at no finite place are left out", path.display());
+    }
+    if bad_views > 0 {
+        warn!(
+            "{}: {bad_views} views of sparse points name no calibrated image and are left out",
+            path.display()
+        );
+    }
+    tracks
+}
+
+/// The stored box, in the single precision that it is used with.
+fn import_roi(obb: &mvs::Obb) -> Roi {
+    let single = |v: f64| f64::from(v as f32);
+    Roi {
+        rotation: Matrix3::from_row_slice(&obb.rotation).map(single),
+        center: Vector3::from(obb.center).map(single),
+        half_extent: Vector3::from(obb.half_extent).map(single),
+    }
+}
+
+#[cfg(test)]
+mod tests;
