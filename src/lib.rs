@@ -5,9 +5,11 @@
 
 pub mod depth_filter;
 mod error;
+pub mod evaluate;
 pub mod fusion;
 pub mod geometry;
 pub mod progress;
+pub mod report;
 pub mod scene;
 pub mod semantics;
 pub mod stereo;

@@ -2,10 +2,13 @@
 
 mod openmvs_maps;
 
+use nalgebra::{Matrix3, Vector3};
 use openmvs_maps::{MapsInMemory, cloud, facade6, scene, shared};
 use semvs::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
+use semvs::geometry::Roi;
 use semvs::progress::Progress;
-use semvs::scene::{PointCloud, PointSource, ResolutionOptions};
+use semvs::scene::{PointCloud, PointSink, PointSource, ResolutionOptions};
+use semvs::store::spool::PointSpool;
 use semvs_formats::ply::Cloud;
 use std::path::Path;
 
@@ -90,6 +93,31 @@ fn a_photographed_scene_is_fused_as_by_openmvs() {
     let maps = tests4_maps(&folder);
     let (points, _) = fused(&maps, &FusionOptions::default());
     assert_same_cloud(&points, &cloud(&folder.join("fuse_fuse3/scene_dense.ply.zst")), MAX_COLOR_SUBSAMPLED);
+}
+
+#[test]
+fn a_crop_leaves_the_points_in_the_order_of_openmvs() {
+    let Some(folder) = shared("reference/tests4") else { return };
+    let maps = tests4_maps(&folder);
+    let options = FusionOptions::default();
+    let input = FusionInput { views: &maps.views, source: &maps, policy: None };
+    let memory = 4 << 20;
+    let mut spool =
+        PointSpool::new(input.layout(&options), Some(tests4_roi()), &std::env::temp_dir(), memory);
+    fuse(&input, &options, &Progress::silent(), &mut spool).unwrap();
+    let spooled = spool.finish().unwrap();
+    let mut points = PointCloud::new(spooled.layout());
+    spooled.for_each(&mut |point| points.push(point)).unwrap();
+    assert_same_cloud(&points, &cloud(&folder.join("fuse_roi1/scene_dense.ply.zst")), MAX_COLOR_SUBSAMPLED);
+}
+
+/// The region that `--estimate-roi 1` finds for this scene.
+fn tests4_roi() -> Roi {
+    Roi {
+        rotation: Matrix3::identity(),
+        center: Vector3::new(0.569575, -0.991925, -3.074815),
+        half_extent: Vector3::new(5.386892, 3.184098, 4.547450),
+    }
 }
 
 fn tests4_maps(folder: &Path) -> MapsInMemory {

@@ -1,5 +1,7 @@
 //! Depth maps: real and synthetic files.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use common::{damage, fixture, shared, small_limits};

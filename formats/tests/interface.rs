@@ -1,5 +1,7 @@
 //! MVSI interface archives: real and synthetic files of every version.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use common::{damage, fixture, shared, small_limits};

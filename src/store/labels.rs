@@ -4,6 +4,7 @@ use super::byte_cache::ByteCache;
 use super::label_png::{LabelReader, UnknownLabel};
 use crate::error::{Error, Result};
 use crate::geometry::Size;
+use crate::progress::{Progress, Stage};
 use crate::scene::{Grid, LabelMap, ViewIndex, resize_nearest};
 use crate::semantics::{ClassId, ClassTable};
 use rayon::prelude::*;
@@ -78,19 +79,26 @@ impl LabelStore {
     /// The class table cannot be used; a view has no label map (the message lists the names tried) or none has; a map
     /// is unreadable, of another aspect ratio than its image, or holds an id or colour that the table lacks. With
     /// several faulty maps the message is about the first and names others.
-    pub fn open(sources: &LabelSources, views: &[LabelRequest], limits: Limits) -> Result<Self> {
+    pub fn open(
+        sources: &LabelSources,
+        views: &[LabelRequest],
+        limits: Limits,
+        progress: &Progress,
+    ) -> Result<Self> {
         if let Some(folder) = sources.label_path.as_deref().filter(|folder| !folder.is_dir()) {
             return Err(Error::content(folder, "no such folder of label maps (--label-path)"));
         }
         let (table, table_is_assumed) = class_table(sources, limits)?;
         let colors = table.colors();
         let reader = LabelReader { table, colors, table_is_assumed, unknown: sources.unknown, limits };
-        let files = find_all(sources, views)?;
+        let files = find_all(sources, views, progress)?;
+        let steps = progress.start(Stage::CheckLabels, files.len());
         let scanned: Vec<Result<_>> = views
             .par_iter()
             .filter_map(|request| files.get(&request.view).map(|path| (request, path)))
             .map(|(request, path)| {
                 let labels = reader.read(path, |size| check_aspect(path, size, request))?;
+                steps.step();
                 Ok((request.view, count_classes(&labels)))
             })
             .collect();
@@ -199,7 +207,11 @@ pub fn candidate_files(label_path: Option<&Path>, request: &LabelRequest) -> Vec
 }
 
 /// The label map of every view that has one.
-fn find_all(sources: &LabelSources, views: &[LabelRequest]) -> Result<HashMap<ViewIndex, PathBuf>> {
+fn find_all(
+    sources: &LabelSources,
+    views: &[LabelRequest],
+    progress: &Progress,
+) -> Result<HashMap<ViewIndex, PathBuf>> {
     let mut files = HashMap::new();
     let mut without = Vec::new();
     for request in views {
@@ -211,6 +223,7 @@ fn find_all(sources: &LabelSources, views: &[LabelRequest]) -> Result<HashMap<Vi
             None => without.push(request),
         }
     }
+    warn_of_shared(views, &files, progress);
     let Some(first) = without.first() else { return Ok(files) };
     if sources.missing == MissingLabels::Refuse || files.is_empty() {
         let tried = candidate_files(sources.label_path.as_deref(), first);
@@ -231,9 +244,21 @@ fn find_all(sources: &LabelSources, views: &[LabelRequest]) -> Result<HashMap<Vi
         )));
     }
     for request in without {
-        tracing::warn!("{}: no label map, all its pixels are void", request.image.display());
+        progress.warn(format!("{}: no label map, all its pixels are void", request.image.display()));
     }
     Ok(files)
+}
+
+/// Two images of one name in different folders may find one label map, which can hardly be right for both.
+fn warn_of_shared(views: &[LabelRequest], files: &HashMap<ViewIndex, PathBuf>, progress: &Progress) {
+    let mut users: HashMap<&Path, &LabelRequest> = HashMap::new();
+    for request in views {
+        let Some(path) = files.get(&request.view) else { continue };
+        if let Some(other) = users.insert(path, request) {
+            let (a, b) = (other.image.display(), request.image.display());
+            progress.warn(format!("{}: label map of both {a} and {b}", path.display()));
+        }
+    }
 }
 
 fn is_same_file(a: &Path, b: &Path) -> bool {

@@ -30,8 +30,12 @@ fn sources(folder: &Path, table: &str) -> LabelSources {
 
 /// Reads `0.png` of `folder` for an image of the same size.
 fn read_one(folder: &Path, table: &str, size: (u32, u32)) -> Result<Vec<u16>> {
-    let store =
-        LabelStore::open(&sources(folder, table), &[request(folder, "0.jpg", None)], Limits::default())?;
+    let store = LabelStore::open(
+        &sources(folder, table),
+        &[request(folder, "0.jpg", None)],
+        Limits::default(),
+        &Progress::silent(),
+    )?;
     Ok(store.load(ViewIndex(0), Size::new(size.0, size.1))?.data().to_vec())
 }
 
@@ -107,13 +111,13 @@ fn an_unknown_label_is_named_with_its_first_pixel_or_taken_for_void() {
     save_grey(&path, (2, 2), &[1, 5, 0, 6]);
     let error = error_of(read_one(folder.path(), "3dom-facade", (2, 2)));
     assert!(error.contains("0.png: id 6 at pixel (1, 1) is not in class table 3dom-facade"), "{error}");
-    let store = LabelStore::open(&void, &request, Limits::default()).unwrap();
+    let store = LabelStore::open(&void, &request, Limits::default(), &Progress::silent()).unwrap();
     assert_eq!(store.load(ViewIndex(0), size).unwrap().data(), [1, 5, 0, 0]);
     assert_eq!(store.pixel_counts(ViewIndex(0)).unwrap()[&ClassId::VOID], 2);
     save(&path, (2, 2), ColorType::Rgb, BitDepth::Eight, &[], &[0, 0, 255, 9, 8, 7, 0, 0, 254, 0, 0, 0]);
     let error = error_of(read_one(folder.path(), "3dom-facade", (2, 2)));
     assert!(error.contains("0.png: colour (9, 8, 7) at pixel (1, 0) is not in"), "{error}");
-    let store = LabelStore::open(&void, &request, Limits::default()).unwrap();
+    let store = LabelStore::open(&void, &request, Limits::default(), &Progress::silent()).unwrap();
     assert_eq!(store.load(ViewIndex(0), size).unwrap().data(), [1, 0, 0, 0]);
 }
 
@@ -132,8 +136,12 @@ fn names_are_tried_in_the_documented_order() {
     assert_eq!(candidate_files(Some(&labels), &request), order);
     for path in order.iter().rev() {
         save_grey(path, (1, 1), &[1]);
-        let store =
-            LabelStore::open(&sources(&labels, "ids"), std::slice::from_ref(&request), Limits::default());
+        let store = LabelStore::open(
+            &sources(&labels, "ids"),
+            std::slice::from_ref(&request),
+            Limits::default(),
+            &Progress::silent(),
+        );
         assert_eq!(store.unwrap().file(request.view), Some(path.as_path()));
     }
     assert_eq!(candidate_files(None, &request), order[5..]);
@@ -145,7 +153,9 @@ fn a_photograph_among_the_labels_is_not_a_label_map() {
     save_grey(&folder.path().join("1.png"), (1, 1), &[200]);
     save_grey(&folder.path().join("1_l.png"), (1, 1), &[3]);
     let request = request(folder.path(), "1.png", None);
-    let store = LabelStore::open(&sources(folder.path(), "ids"), &[request], Limits::default()).unwrap();
+    let store =
+        LabelStore::open(&sources(folder.path(), "ids"), &[request], Limits::default(), &Progress::silent())
+            .unwrap();
     assert_eq!(store.load(ViewIndex(1), Size::new(1, 1)).unwrap().data(), [3]);
 }
 
@@ -155,7 +165,7 @@ fn a_missing_map_is_an_error_that_lists_the_names_or_all_void() {
     save_grey(&folder.path().join("1.png"), (2, 2), &[1, 2, 3, 4]);
     let views = ["1.jpg", "2.jpg", "3.jpg"].map(|name| request(folder.path(), name, Some((2, 2))));
     let mut sources = sources(folder.path(), "ids");
-    let error = error_of(LabelStore::open(&sources, &views, Limits::default()));
+    let error = error_of(LabelStore::open(&sources, &views, Limits::default(), &Progress::silent()));
     assert!(error.starts_with("no label map for 2 of 3 images, such as "), "{error}");
     assert!(
         ["2.png", "2.jpg.png", "2_l.png", "2.label.png", "2.mask.png"].iter().all(|n| error.contains(n)),
@@ -163,10 +173,10 @@ fn a_missing_map_is_an_error_that_lists_the_names_or_all_void() {
     );
     assert!(error.ends_with("--missing-labels void takes such images as unlabelled"), "{error}");
     sources.missing = MissingLabels::Void;
-    let store = LabelStore::open(&sources, &views, Limits::default()).unwrap();
+    let store = LabelStore::open(&sources, &views, Limits::default(), &Progress::silent()).unwrap();
     assert_eq!(store.load(ViewIndex(3), Size::new(2, 1)).unwrap().data(), [0, 0]);
     assert_eq!(store.load(ViewIndex(1), Size::new(2, 2)).unwrap().data(), [1, 2, 3, 4]);
-    let error = error_of(LabelStore::open(&sources, &views[1..], Limits::default()));
+    let error = error_of(LabelStore::open(&sources, &views[1..], Limits::default(), &Progress::silent()));
     assert!(error.starts_with("no image has a label map"), "{error}");
 }
 
@@ -180,6 +190,7 @@ fn a_map_has_its_images_shape() {
             &sources(folder.path(), "ids"),
             &[request(folder.path(), "1.jpg", Some(image))],
             Limits::default(),
+            &Progress::silent(),
         )
     };
     for (map, image) in
@@ -207,7 +218,12 @@ fn all_faulty_maps_are_found_at_once() {
     for i in 2..=6 {
         save_grey(&folder.path().join(format!("{i}.png")), (2, 9), &[0; 18]);
     }
-    let error = error_of(LabelStore::open(&sources(folder.path(), "ids"), &views, Limits::default()));
+    let error = error_of(LabelStore::open(
+        &sources(folder.path(), "ids"),
+        &views,
+        Limits::default(),
+        &Progress::silent(),
+    ));
     assert!(error.contains("2.png: the label map has 2×9 pixels"), "{error}");
     assert!(
         error.contains("(faulty as well: ") && error.contains("4.png") && error.ends_with("and 1 more)"),
@@ -250,8 +266,12 @@ fn nothing_is_allocated_on_a_files_word() {
     assert!(error.contains("claims 65536×65536 pixels, more than the file can hold"), "{error}");
     save_grey(&path, (100, 100), &[3; 10_000]);
     let limits = Limits { max_bytes: 10_000, ..Limits::default() };
-    let store =
-        LabelStore::open(&sources(folder.path(), "ids"), &[request(folder.path(), "0.jpg", None)], limits);
+    let store = LabelStore::open(
+        &sources(folder.path(), "ids"),
+        &[request(folder.path(), "0.jpg", None)],
+        limits,
+        &Progress::silent(),
+    );
     assert!(error_of(store).contains("0.png"));
 }
 
@@ -286,7 +306,8 @@ fn tables_come_from_the_option_then_from_labels_json_then_from_the_ids() {
     save_grey(&folder.path().join("0.png"), (2, 1), &[0, 2]);
     let table = |name: &str| {
         let views = [request(folder.path(), "0.jpg", None)];
-        LabelStore::open(&sources(folder.path(), name), &views, Limits::default()).map(|s| s.table().clone())
+        LabelStore::open(&sources(folder.path(), name), &views, Limits::default(), &Progress::silent())
+            .map(|s| s.table().clone())
     };
     let ids = table("").unwrap();
     assert_eq!((ids.name(), ids.classes().len(), ids.classes()[0].name.as_str()), ("ids", 1, "class-2"));
@@ -308,8 +329,13 @@ fn the_bundled_label_maps_are_read_exactly() {
         .iter()
         .map(|n| request(&facade.join("images"), &format!("{n}.jpg"), Some((400, 300))))
         .collect();
-    let store =
-        LabelStore::open(&sources(&facade.join("labels"), "3dom-facade"), &views, Limits::default()).unwrap();
+    let store = LabelStore::open(
+        &sources(&facade.join("labels"), "3dom-facade"),
+        &views,
+        Limits::default(),
+        &Progress::silent(),
+    )
+    .unwrap();
     for request in &views {
         let labels = store.load(request.view, Size::new(400, 300)).unwrap();
         let path = store.file(request.view).unwrap();

@@ -3,6 +3,8 @@
 pub mod atomic;
 mod byte_cache;
 pub mod cameras;
+pub mod cloud;
+mod cloud_names;
 mod depth_map;
 pub mod depth_store;
 pub mod export;
@@ -13,3 +15,4 @@ mod label_png;
 pub mod labels;
 pub mod masks;
 pub mod paths;
+pub mod spool;

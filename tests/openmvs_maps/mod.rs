@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 use semvs::Result;
 use semvs::fusion::{FusionMaps, FusionView, MapInfo, MapSource};
-use semvs::geometry::{Camera, Roi, Size};
+use semvs::geometry::{Camera, Size};
 use semvs::scene::{DepthEstimate, Grid, ImageId, ResolutionOptions, ViewIndex};
 use semvs::store::images::load_working_color;
 use semvs_formats::dmap::DepthMapFile;
@@ -69,15 +69,6 @@ pub(crate) fn scene(path: &Path) -> Scene {
 /// The neighbour lists of a scene, best first. None of the scenes here has more than the filters and fusion retain.
 pub(crate) fn neighbor_lists(scene: &Scene) -> Vec<Vec<ViewIndex>> {
     scene.images.iter().map(|image| image.view_scores.iter().map(|s| ViewIndex(s.image)).collect()).collect()
-}
-
-/// The region of interest of a scene.
-pub(crate) fn roi(scene: &Scene) -> Option<Roi> {
-    scene.obb.map(|obb| Roi {
-        rotation: Matrix3::from_row_slice(&obb.rotation),
-        center: Vector3::from(obb.center),
-        half_extent: Vector3::from(obb.half_extent),
-    })
 }
 
 /// A cloud.

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::{CONFIDENCE, DEPTH, DepthMapFile, DepthMapHeader, MAGIC, NORMAL, VIEWS, finite, usable};
-use crate::wire::Writer;
+use crate::wire::{Writer, vec3f_bytes};
 use crate::{Error, Result};
 
 impl DepthMapFile {
@@ -56,10 +56,10 @@ impl DepthMapFile {
         w.f64s(&self.k)?;
         w.f64s(&self.rotation)?;
         w.f64s(&self.center)?;
-        self.depth.iter().try_for_each(|&d| w.f32s(&[usable(d)]))?;
-        self.normal.iter().try_for_each(|&n| w.f32s(&finite(n)))?;
-        self.confidence.iter().try_for_each(|&c| w.f32s(&[usable(c)]))?;
-        self.views.iter().try_for_each(|v| w.bytes(v))?;
+        w.records(&self.depth, |&d| usable(d).to_le_bytes())?;
+        w.records(&self.normal, |&n| vec3f_bytes(&finite(n)))?;
+        w.records(&self.confidence, |&c| usable(c).to_le_bytes())?;
+        w.bytes(self.views.as_flattened())?;
         w.finish()
     }
 

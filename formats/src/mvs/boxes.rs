@@ -1,6 +1,6 @@
 //! The region of interest, and how each container spells it.
 
-use super::scene::IDENTITY3;
+use super::scene::{IDENTITY3, Scene};
 
 /// Largest entry of `R Rᵀ - I` of a matrix that counts as a rotation.
 pub(crate) const ROTATION_TOLERANCE: f64 = 1e-3;
@@ -43,7 +43,15 @@ pub enum StoredBox {
 impl StoredBox {
     /// The box that the bytes mean; `None` if it has no volume, is not finite or not rotated properly.
     pub fn decode(&self) -> Option<Obb> {
-        let obb = match *self {
+        let obb = self.as_obb();
+        let finite = obb.center.iter().chain(&obb.half_extent).all(|v| v.is_finite());
+        let volume = obb.half_extent.iter().all(|&v| v > 0.0);
+        (finite && volume && is_orthonormal(&obb.rotation)).then_some(obb)
+    }
+
+    /// The numbers of the box, good or bad.
+    fn as_obb(&self) -> Obb {
+        match *self {
             StoredBox::Corners { rotation, min, max } => Obb {
                 rotation,
                 center: [0, 1, 2].map(|i| 0.5 * (min[i] + max[i])),
@@ -54,14 +62,39 @@ impl StoredBox {
                 center: center.map(f64::from),
                 half_extent: half_extent.map(f64::from),
             },
+        }
+    }
+
+    /// The box of a scene as MVSI files spell it: as it was stored, if that is still what `obb` says.
+    pub(crate) fn corners_of(scene: &Scene) -> StoredBox {
+        match scene.stored_box.filter(|s| s.decode() == scene.obb) {
+            Some(stored @ StoredBox::Corners { .. }) => stored,
+            Some(stored) => StoredBox::corners(Some(&stored.as_obb())),
+            None => StoredBox::corners(scene.obb.as_ref()),
+        }
+    }
+
+    /// The box of a scene as native archives spell it: as it was stored, if that is still what `obb` says.
+    pub(crate) fn center_of(scene: &Scene) -> StoredBox {
+        match scene.stored_box.filter(|s| s.decode() == scene.obb) {
+            Some(stored @ StoredBox::Center { .. }) => stored,
+            Some(stored) => StoredBox::center(Some(&stored.as_obb())),
+            None => StoredBox::center(scene.obb.as_ref()),
+        }
+    }
+
+    /// Sets the box of a scene from its file; keeps the spelling only if `obb` alone would be spelled differently.
+    pub(crate) fn store(self, scene: &mut Scene) {
+        scene.obb = self.decode();
+        let spelled = match self {
+            StoredBox::Corners { .. } => StoredBox::corners(scene.obb.as_ref()),
+            StoredBox::Center { .. } => StoredBox::center(scene.obb.as_ref()),
         };
-        let finite = obb.center.iter().chain(&obb.half_extent).all(|v| v.is_finite());
-        let volume = obb.half_extent.iter().all(|&v| v > 0.0);
-        (finite && volume && is_orthonormal(&obb.rotation)).then_some(obb)
+        scene.stored_box = (!self.same_bits(&spelled)).then_some(self);
     }
 
     /// The box as MVSI spells it; `None` is the identity with both corners at the origin.
-    pub(crate) fn corners(obb: Option<&Obb>) -> StoredBox {
+    fn corners(obb: Option<&Obb>) -> StoredBox {
         match obb {
             None => StoredBox::Corners { rotation: IDENTITY3, min: [0.0; 3], max: [0.0; 3] },
             Some(o) => StoredBox::Corners {
@@ -73,7 +106,7 @@ impl StoredBox {
     }
 
     /// The box as native archives spell it; `None` is the identity at the origin without extent.
-    pub(crate) fn center(obb: Option<&Obb>) -> StoredBox {
+    fn center(obb: Option<&Obb>) -> StoredBox {
         let (rotation, center, half_extent) = match obb {
             None => (IDENTITY3, [0.0; 3], [0.0; 3]),
             Some(o) => (o.rotation, o.center, o.half_extent),
@@ -86,7 +119,7 @@ impl StoredBox {
     }
 
     /// Whether both are of one kind with the same bits.
-    pub(crate) fn same_bits(&self, other: &StoredBox) -> bool {
+    fn same_bits(&self, other: &StoredBox) -> bool {
         match (self, other) {
             (
                 StoredBox::Corners { rotation: r, min: a, max: b },

@@ -1,6 +1,7 @@
 //! Whether a scene can be used: indices, lengths, numbers.
 
 use super::boxes::is_orthonormal;
+use super::mesh::Mesh;
 use super::scene::{Camera, Image, NO_ID, Scene, Visibility};
 use crate::wire::Place;
 use crate::{Error, Result};
@@ -76,7 +77,8 @@ impl Scene {
         check_length(self.points.normals.len(), points, "points", "verticesNormal")?;
         check_length(self.points.colors.len(), points, "points", "verticesColor")?;
         check_length(self.line_normals.len(), self.lines.len(), "lines", "linesNormal")?;
-        check_length(self.line_colors.len(), self.lines.len(), "lines", "linesColor")
+        check_length(self.line_colors.len(), self.lines.len(), "lines", "linesColor")?;
+        check_mesh_lengths(&self.mesh)
     }
 
     /// Checks the indices, which programs that read a scene trust; lengths must have been checked.
@@ -98,7 +100,7 @@ impl Scene {
                 check_index(image, images, "images", &place.item(i).field("views"))?;
             }
         }
-        Ok(())
+        check_mesh_indices(&self.mesh)
     }
 
     fn check_image_indices(&self, image: &Image, at: &Place<'_>) -> Result<()> {
@@ -129,6 +131,49 @@ fn check_views(views: &Visibility, points: usize) -> Result<()> {
         return Err(invalid(&place, format!("{weights} weights for {images} views")));
     }
     Ok(())
+}
+
+fn check_mesh_lengths(mesh: &Mesh) -> Result<()> {
+    let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
+    check_length(mesh.vertex_normals.len(), vertices, "vertices", "mesh.vertexNormals")?;
+    check_length(mesh.vertex_vertices.ends.len(), vertices, "vertices", "mesh.vertexVertices")?;
+    check_length(mesh.vertex_faces.ends.len(), vertices, "vertices", "mesh.vertexFaces")?;
+    check_length(mesh.vertex_boundary.len(), vertices, "vertices", "mesh.vertexBoundary")?;
+    check_length(mesh.face_normals.len(), faces, "faces", "mesh.faceNormals")?;
+    check_length(mesh.face_texcoords.len(), faces.saturating_mul(3), "face corners", "mesh.faceTexcoords")?;
+    check_length(mesh.face_textures.len(), faces, "faces", "mesh.faceTexindices")?;
+    for (field, lists) in [("vertexVertices", &mesh.vertex_vertices), ("vertexFaces", &mesh.vertex_faces)] {
+        if !lists.ends.is_sorted() || lists.ends.last().copied().unwrap_or(0) != lists.indices.len() as u64 {
+            return Err(invalid(&ROOT.field("mesh").field(field), "the ends of its lists are out of order"));
+        }
+    }
+    let place = ROOT.field("mesh");
+    let place = place.field("textures");
+    if mesh.textures.len() > 255 {
+        return Err(invalid(&place, format!("{} textures, at most 255 are possible", mesh.textures.len())));
+    }
+    for (i, texture) in mesh.textures.iter().enumerate() {
+        let (w, h, pixels) = (texture.width, texture.height, texture.pixels.len());
+        if w == 0 || h == 0 || w.max(h) > i32::MAX as u32 || u64::from(w) * u64::from(h) != pixels as u64 {
+            return Err(invalid(&place.item(i), format!("{pixels} pixels do not make a picture of {w}×{h}")));
+        }
+    }
+    Ok(())
+}
+
+fn check_mesh_indices(mesh: &Mesh) -> Result<()> {
+    let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
+    let place = ROOT.field("mesh");
+    let all = |indices: &[u32], count: usize, of: &str, field: &'static str| {
+        indices.iter().try_for_each(|&i| check_index(i, count, of, &place.field(field)))
+    };
+    all(mesh.faces.as_flattened(), vertices, "vertices", "faces")?;
+    all(&mesh.vertex_vertices.indices, vertices, "vertices", "vertexVertices")?;
+    all(&mesh.vertex_faces.indices, faces, "faces", "vertexFaces")?;
+    let textures = mesh.textures.len();
+    mesh.face_textures
+        .iter()
+        .try_for_each(|&t| check_index(t.into(), textures, "textures", &place.field("faceTexindices")))
 }
 
 fn check_index(index: u32, count: usize, of: &str, place: &Place<'_>) -> Result<()> {

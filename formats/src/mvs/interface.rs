@@ -1,7 +1,6 @@
 //! The MVSI interface archive, versions 0 to 7: reading and writing of every version.
 
 use std::io::{Read, Write};
-use std::mem::size_of;
 
 use super::boxes::StoredBox;
 use super::scene::{Camera, Image, Line, NO_ID, Platform, PointCloud, Pose, Scene, ViewScore};
@@ -10,13 +9,34 @@ use crate::{Error, Result};
 
 /// First bytes of versions 1 and later.
 pub(crate) const MAGIC: [u8; 4] = *b"MVSI";
+/// Bytes before the body of versions 1 and later: magic, version, reserved.
+pub(crate) const HEADER: usize = 12;
 /// Newest version of the interface archive.
 pub const NEWEST_VERSION: u32 = 7;
 
 const ROOT: Place<'static> = Place::Root("");
 
+/// Version and reserved word, from what follows the magic.
+pub(crate) fn parse_header(head: &[u8]) -> Result<(u32, u32)> {
+    let Some((&[v0, v1, v2, v3, reserved @ ..], _)) = head.split_first_chunk::<{ HEADER - 4 }>() else {
+        let what = format!("file ends: the header has {HEADER} bytes, {} are there", head.len() + 4);
+        return Err(Error::Format { offset: 0, field: "header".into(), what });
+    };
+    let version = u32::from_le_bytes([v0, v1, v2, v3]);
+    if !(1..=NEWEST_VERSION).contains(&version) {
+        return Err(Error::Unsupported(format!(
+            "MVSI interface archive of version {version}; versions 0 to {NEWEST_VERSION} can be read"
+        )));
+    }
+    Ok((version, u32::from_le_bytes(reserved)))
+}
+
 /// Reads the body that follows the header.
 pub(crate) fn read_body<R: Read>(r: &mut Reader<R>, version: u32) -> Result<Scene> {
+    if let Some(length) = r.remaining() {
+        // The widest ratios of values to bytes: an image of version 0 has 20 bytes, a platform 24.
+        r.cap_budget(length.saturating_mul(3).saturating_add(32 << 20));
+    }
     let mut scene = Scene::default();
     let place = ROOT.field("platforms");
     scene.platforms = list(r, 24, &place, |r, at| read_platform(r, version, at))?;
@@ -35,11 +55,8 @@ pub(crate) fn read_body<R: Read>(r: &mut Reader<R>, version: u32) -> Result<Scen
     if version >= 6 {
         let place = ROOT.field("obb");
         let [rotation, min, max] = ["rot", "ptMin", "ptMax"].map(|name| place.field(name));
-        let stored =
-            StoredBox::Corners { rotation: r.f64s(&rotation)?, min: r.f64s(&min)?, max: r.f64s(&max)? };
-        scene.obb = stored.decode();
-        let spelled = StoredBox::corners(scene.obb.as_ref());
-        scene.stored_box = (!stored.same_bits(&spelled)).then_some(stored);
+        StoredBox::Corners { rotation: r.f64s(&rotation)?, min: r.f64s(&min)?, max: r.f64s(&max)? }
+            .store(&mut scene);
     }
     Ok(scene)
 }
@@ -174,12 +191,6 @@ fn read_line<R: Read>(r: &mut Reader<R>, at: &Place<'_>) -> Result<Line> {
     let (start, end) = (r.f32s(&at.field("pt1"))?, r.f32s(&at.field("pt2"))?);
     let views = list(r, 8, &at.field("views"), |r, at| Ok((r.u32(at)?, r.f32(at)?)))?;
     Ok(Line { start, end, views })
-}
-
-/// Most bytes that the values of an interface archive of `length` bytes can take in memory.
-pub(crate) fn memory_bound(length: u64) -> u64 {
-    // The widest ratios: an image of version 0 has 20 bytes, a platform 24.
-    length.saturating_mul(3).saturating_add(32 << 20).max(size_of::<Scene>() as u64)
 }
 
 /// Writes an interface archive of the given version, 0 to [`NEWEST_VERSION`].
@@ -325,12 +336,7 @@ fn write_colors<W: Write>(w: &mut Writer<W>, colors: &[[u8; 3]]) -> Result<()> {
 }
 
 fn write_box<W: Write>(w: &mut Writer<W>, scene: &Scene) -> Result<()> {
-    let spelled = StoredBox::corners(scene.obb.as_ref());
-    let stored = match scene.stored_box {
-        Some(stored @ StoredBox::Corners { .. }) if stored.decode() == scene.obb => stored,
-        _ => spelled,
-    };
-    if let StoredBox::Corners { rotation, min, max } = stored {
+    if let StoredBox::Corners { rotation, min, max } = StoredBox::corners_of(scene) {
         w.f64s(&rotation)?;
         w.f64s(&min)?;
         w.f64s(&max)?;

@@ -10,9 +10,9 @@ pub struct Mesh {
     /// Empty or one per vertex.
     pub vertex_normals: Vec<[f32; 3]>,
     /// Neighbouring vertices of each vertex.
-    pub vertex_vertices: Vec<Vec<u32>>,
+    pub vertex_vertices: IndexLists,
     /// Faces at each vertex.
-    pub vertex_faces: Vec<Vec<u32>>,
+    pub vertex_faces: IndexLists,
     /// Whether each vertex is on the boundary (0 or 1).
     pub vertex_boundary: Vec<u8>,
     /// Empty or one per face.
@@ -29,6 +29,25 @@ impl Mesh {
     /// Whether it has neither vertices nor textures.
     pub fn is_empty(&self) -> bool {
         *self == Mesh::default()
+    }
+}
+
+/// Lists of indices, stored back to back.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct IndexLists {
+    /// Where each list ends in `indices`; it starts where the one before ends, the first at 0.
+    pub ends: Vec<u64>,
+    /// Entries of all lists.
+    pub indices: Vec<u32>,
+}
+
+impl IndexLists {
+    /// The lists in order; where `ends` is out of order or range, an empty one.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        starts
+            .zip(&self.ends)
+            .map(|(&start, &end)| self.indices.get(start as usize..end as usize).unwrap_or_default())
     }
 }
 

@@ -311,27 +311,30 @@ impl Columns {
 
     fn decode_views(&self, block: Block<'_>, cloud: &mut Cloud, first: u64, at: u64) -> Result<()> {
         let Some(views) = self.views else { return Ok(()) };
+        let unsigned = {
+            use ScalarType::{U8, U16, U32};
+            matches!(views.kind, PropertyType::List { item: U8 | U16 | U32, .. })
+        };
         let lists = &mut cloud.views;
         if lists.offsets.is_empty() {
             lists.offsets.push(0);
         }
         for index in 0..block.len() {
             let field = |name| format!("vertex[{}].{name}", first + index as u64);
-            let entries = block.list(index, views);
-            let count = entries.len();
-            for v in entries {
-                if !is_index(v, f64::from(u32::MAX)) {
+            let count = block.list(index, views, &mut lists.images, |v| v as u32);
+            if !unsigned {
+                let mut stored = Vec::with_capacity(count);
+                block.list(index, views, &mut stored, |v| v);
+                if let Some(v) = stored.iter().find(|v| !is_index(**v, f64::from(u32::MAX))) {
                     return Err(broken(at, field("view_indices"), format!("{v} is not an image index")));
                 }
-                lists.images.push(v as u32);
             }
             if let Some(weights) = self.weights {
-                let weights = block.list(index, weights);
-                if weights.len() != count {
-                    let what = format!("{} weights for {count} views", weights.len());
+                let weights = block.list(index, weights, &mut lists.weights, |w| w as f32);
+                if weights != count {
+                    let what = format!("{weights} weights for {count} views");
                     return Err(broken(at, field("view_weights"), what));
                 }
-                lists.weights.extend(weights.map(|w| w as f32));
             }
             lists.offsets.push(lists.images.len() as u64);
         }

@@ -128,19 +128,36 @@ impl Block<'_> {
         }
     }
 
-    /// The entries of record `index` at a list's place.
-    pub(super) fn list(&self, index: usize, place: Place) -> impl ExactSizeIterator<Item = f64> {
-        let (first, last, item) = match place.kind {
-            PropertyType::List { count, item } => {
-                let anchors = &self.anchors[index * self.stride..(index + 1) * self.stride];
-                (anchors[place.anchor] + place.offset + count.bytes(), anchors[place.anchor + 1], item)
-            }
-            PropertyType::Scalar(t) => (0, 0, t),
-        };
-        let big_endian = self.big_endian;
-        let entries = self.bytes[first..last].chunks_exact(item.bytes());
-        entries.map(move |bytes| decode(bytes, item, big_endian).unwrap_or(0.0))
+    /// Appends the entries of record `index` at a list's place and returns their number.
+    pub(super) fn list<T>(
+        &self,
+        index: usize,
+        place: Place,
+        out: &mut Vec<T>,
+        convert: impl Fn(f64) -> T,
+    ) -> usize {
+        let PropertyType::List { count, item } = place.kind else { return 0 };
+        let anchors = &self.anchors[index * self.stride..(index + 1) * self.stride];
+        let first = anchors[place.anchor] + place.offset + count.bytes();
+        let bytes = &self.bytes[first..anchors[place.anchor + 1]];
+        let big = self.big_endian;
+        match item {
+            ScalarType::I8 => entries(bytes, out, |b| convert(f64::from(i8::from_le_bytes(b)))),
+            ScalarType::U8 => entries(bytes, out, |b| convert(f64::from(u8::from_le_bytes(b)))),
+            ScalarType::I16 => entries(bytes, out, |b| convert(f64::from(i16::from_le_bytes(swap(b, big))))),
+            ScalarType::U16 => entries(bytes, out, |b| convert(f64::from(u16::from_le_bytes(swap(b, big))))),
+            ScalarType::I32 => entries(bytes, out, |b| convert(f64::from(i32::from_le_bytes(swap(b, big))))),
+            ScalarType::U32 => entries(bytes, out, |b| convert(f64::from(u32::from_le_bytes(swap(b, big))))),
+            ScalarType::F32 => entries(bytes, out, |b| convert(f64::from(f32::from_le_bytes(swap(b, big))))),
+            ScalarType::F64 => entries(bytes, out, |b| convert(f64::from_le_bytes(swap(b, big)))),
+        }
+        bytes.len() / item.bytes()
     }
+}
+
+/// Appends the decoded values of `bytes`.
+fn entries<const N: usize, T>(bytes: &[u8], out: &mut Vec<T>, decode: impl Fn([u8; N]) -> T) {
+    out.extend(bytes.as_chunks().0.iter().map(|b| decode(*b)));
 }
 
 /// Most significant byte first to least significant byte first, if `big`.

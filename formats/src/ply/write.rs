@@ -111,52 +111,59 @@ impl<W: Write> PlyWriter<W> {
 
 /// Where numbers go, in the notation of the encoding.
 trait Sink {
-    fn u8(&mut self, value: u8);
-    fn u16(&mut self, value: u16);
-    fn u32(&mut self, value: u32);
-    fn f32(&mut self, value: f32);
-    fn f64(&mut self, value: f64);
+    fn integers(&mut self, width: usize, values: &[u32]);
+    fn floats(&mut self, values: &[f32]);
+    fn doubles(&mut self, values: &[f64]);
 }
 
 struct Binary<'a>(&'a mut Vec<u8>);
 
+impl Binary<'_> {
+    /// `N` bytes at the end for each of `values`.
+    #[inline]
+    fn push<const N: usize, T: Copy>(&mut self, values: &[T], encode: impl Fn(T) -> [u8; N]) {
+        let first = self.0.len();
+        self.0.resize(first + N * values.len(), 0);
+        for (bytes, value) in self.0[first..].as_chunks_mut().0.iter_mut().zip(values) {
+            *bytes = encode(*value);
+        }
+    }
+}
+
 impl Sink for Binary<'_> {
-    fn u8(&mut self, value: u8) {
-        self.0.push(value);
+    #[inline]
+    fn integers(&mut self, width: usize, values: &[u32]) {
+        match width {
+            1 => self.push(values, |v| [v as u8]),
+            2 => self.push(values, |v| (v as u16).to_le_bytes()),
+            _ => self.push(values, u32::to_le_bytes),
+        }
     }
-    fn u16(&mut self, value: u16) {
-        self.0.extend_from_slice(&value.to_le_bytes());
+    #[inline]
+    fn floats(&mut self, values: &[f32]) {
+        self.push(values, f32::to_le_bytes);
     }
-    fn u32(&mut self, value: u32) {
-        self.0.extend_from_slice(&value.to_le_bytes());
-    }
-    fn f32(&mut self, value: f32) {
-        self.0.extend_from_slice(&value.to_le_bytes());
-    }
-    fn f64(&mut self, value: f64) {
-        self.0.extend_from_slice(&value.to_le_bytes());
+    #[inline]
+    fn doubles(&mut self, values: &[f64]) {
+        self.push(values, f64::to_le_bytes);
     }
 }
 
 struct Ascii<'a>(&'a mut Vec<u8>);
 
 impl Sink for Ascii<'_> {
-    fn u8(&mut self, value: u8) {
-        self.u32(value.into());
+    fn integers(&mut self, _width: usize, values: &[u32]) {
+        for value in values {
+            self.0.extend(format!("{value} ").bytes());
+        }
     }
-    fn u16(&mut self, value: u16) {
-        self.u32(value.into());
+    fn floats(&mut self, values: &[f32]) {
+        values.iter().for_each(|v| push_number(f64::from(*v), self.0));
     }
-    fn u32(&mut self, value: u32) {
-        self.0.extend(value.to_string().bytes());
-        self.0.push(b' ');
-    }
-    fn f32(&mut self, value: f32) {
-        push_number(value.into(), self.0);
-    }
-    fn f64(&mut self, value: f64) {
-        self.0.extend(value.to_string().bytes());
-        self.0.push(b' ');
+    fn doubles(&mut self, values: &[f64]) {
+        for value in values {
+            self.0.extend(format!("{value} ").bytes());
+        }
     }
 }
 
@@ -165,42 +172,41 @@ impl Sink for Ascii<'_> {
 #[inline]
 fn put(out: &mut impl Sink, field: Field, cloud: &Cloud, index: usize, chosen: Option<&[usize]>) -> bool {
     match field {
-        Field::Position => cloud.positions[index].iter().for_each(|v| out.f32(*v)),
+        Field::Position => out.floats(&cloud.positions[index]),
         Field::PositionF64 => {
             let widened = cloud.positions[index].map(f64::from);
-            cloud.positions_f64.get(index).unwrap_or(&widened).iter().for_each(|v| out.f64(*v));
+            out.doubles(cloud.positions_f64.get(index).unwrap_or(&widened));
         }
-        Field::Color => cloud.colors[index].iter().for_each(|v| out.u8(*v)),
-        Field::Normal => cloud.normals[index].iter().for_each(|v| out.f32(*v)),
-        Field::LabelU8 => match u8::try_from(cloud.labels[index]) {
-            Ok(label) => out.u8(label),
-            Err(_) => return false,
-        },
-        Field::LabelU16 => out.u16(cloud.labels[index]),
-        Field::LabelConfidence => out.f32(cloud.label_confidence[index]),
+        Field::Color => out.integers(1, &cloud.colors[index].map(u32::from)),
+        Field::Normal => out.floats(&cloud.normals[index]),
+        Field::LabelU8 if cloud.labels[index] > 255 => return false,
+        Field::LabelU8 => out.integers(1, &[cloud.labels[index].into()]),
+        Field::LabelU16 => out.integers(2, &[cloud.labels[index].into()]),
+        Field::LabelConfidence => out.floats(&[cloud.label_confidence[index]]),
         Field::ViewCount => {
             let listed = cloud.images_of(index).len() as u32;
-            out.u8(cloud.view_counts.get(index).copied().unwrap_or(listed).min(255) as u8);
+            out.integers(1, &[cloud.view_counts.get(index).copied().unwrap_or(listed).min(255)]);
         }
-        Field::ViewIndices => put_list(out, cloud.images_of(index), chosen, |out, v| out.u32(v)),
-        Field::ViewWeights => put_list(out, cloud.weights_of(index), chosen, |out, v| out.f32(v)),
-        Field::Confidence => out.f32(cloud.confidence[index]),
-        Field::Value => out.f32(cloud.value[index]),
+        Field::ViewIndices => with_chosen(cloud.images_of(index), chosen, |list| {
+            out.integers(1, &[list.len() as u32]);
+            out.integers(4, list);
+        }),
+        Field::ViewWeights => with_chosen(cloud.weights_of(index), chosen, |list| {
+            out.integers(1, &[list.len() as u32]);
+            out.floats(list);
+        }),
+        Field::Confidence => out.floats(&[cloud.confidence[index]]),
+        Field::Value => out.floats(&[cloud.value[index]]),
     }
     true
 }
 
+/// Hands the chosen entries of `list` to `put`.
 #[inline]
-fn put_list<S: Sink, T: Copy>(out: &mut S, list: &[T], chosen: Option<&[usize]>, put: impl Fn(&mut S, T)) {
+fn with_chosen<T: Copy>(list: &[T], chosen: Option<&[usize]>, put: impl FnOnce(&[T])) {
     match chosen {
-        None => {
-            out.u8(list.len() as u8);
-            list.iter().for_each(|&v| put(out, v));
-        }
-        Some(chosen) => {
-            out.u8(chosen.len() as u8);
-            chosen.iter().for_each(|&i| put(out, list[i]));
-        }
+        None => put(list),
+        Some(chosen) => put(&chosen.iter().map(|&i| list[i]).collect::<Vec<_>>()),
     }
 }
 

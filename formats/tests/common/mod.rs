@@ -1,5 +1,5 @@
 //! Where the test files are.
-#![allow(dead_code)]
+#![allow(clippy::print_stdout, dead_code)]
 
 use std::path::{Path, PathBuf};
 

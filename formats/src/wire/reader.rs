@@ -1,46 +1,15 @@
-//! Little-endian reader and writer that know their offset; counted vectors under limits.
+//! The reader.
 
-use std::fmt;
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::mem::size_of;
 use std::path::Path;
 
+use super::{BUFFER, Place, open};
 use crate::{Error, Limits, Result};
 
-/// Bytes that a [`Reader`] or [`Writer`] holds at most.
-const BUFFER: usize = 256 << 10;
 /// Elements reserved before their bytes were seen, where the length of the input is unknown.
 const RESERVE_UNSEEN: usize = 16 << 10;
-
-/// Where a value belongs, for error messages; built on the stack, rendered only when something is wrong.
-#[derive(Clone, Copy)]
-pub(crate) enum Place<'a> {
-    Root(&'static str),
-    Field(&'a Place<'a>, &'static str),
-    Item(&'a Place<'a>, u64),
-}
-
-impl<'a> Place<'a> {
-    pub(crate) fn field(&'a self, name: &'static str) -> Place<'a> {
-        Place::Field(self, name)
-    }
-
-    pub(crate) fn item(&'a self, index: usize) -> Place<'a> {
-        Place::Item(self, index as u64)
-    }
-}
-
-impl fmt::Display for Place<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Place::Root(name) => f.write_str(name),
-            Place::Field(Place::Root(""), name) => f.write_str(name),
-            Place::Field(parent, name) => write!(f, "{parent}.{name}"),
-            Place::Item(parent, index) => write!(f, "{parent}[{index}]"),
-        }
-    }
-}
 
 /// Buffered little-endian reader. Every count is checked against the bytes that remain (where they are
 /// known) and every allocation against the budget of the [`Limits`].
@@ -66,12 +35,7 @@ impl<'a> Reader<&'a [u8]> {
 
 impl Reader<File> {
     pub(crate) fn open(path: &Path, limits: &Limits) -> Result<Self> {
-        let file = File::open(path)?;
-        let metadata = file.metadata()?;
-        if metadata.is_dir() {
-            return Err(Error::Io(io::ErrorKind::IsADirectory.into()));
-        }
-        let length = metadata.is_file().then_some(metadata.len());
+        let (file, length) = open(path)?;
         Ok(Reader::new(file, length, limits))
     }
 }
@@ -89,6 +53,11 @@ impl<R: Read> Reader<R> {
             budget: limits.max_bytes,
             limits: *limits,
         }
+    }
+
+    /// Says that `offset` bytes of the input, which `length` counts, were read before.
+    pub(crate) fn start_at(&mut self, offset: u64) {
+        self.offset = offset;
     }
 
     /// Bytes left, if the length of the input is known.
@@ -145,7 +114,18 @@ impl<R: Read> Reader<R> {
         self.error(place, format!("file ends: {wanted} bytes needed, {have} left"))
     }
 
-    fn advance(&mut self, bytes: usize) {
+    /// All bytes that are buffered; at least `wanted` (≤ buffer size), unless the input ends before.
+    #[inline]
+    pub(crate) fn buffered(&mut self, wanted: usize) -> Result<&[u8]> {
+        if self.end - self.start < wanted {
+            self.fill(wanted)?;
+        }
+        Ok(&self.buffer[self.start..self.end])
+    }
+
+    /// Skips `bytes` of what [`Reader::buffered`] returned.
+    #[inline]
+    pub(crate) fn advance(&mut self, bytes: usize) {
         self.start += bytes;
         self.offset += bytes as u64;
     }
@@ -160,12 +140,6 @@ impl<R: Read> Reader<R> {
         out.copy_from_slice(&self.buffer[self.start..self.start + N]);
         self.advance(N);
         Ok(out)
-    }
-
-    /// Up to `N` bytes at the current position without consuming them.
-    pub(crate) fn peek(&mut self, n: usize) -> Result<&[u8]> {
-        let have = self.fill(n)?.min(n);
-        Ok(&self.buffer[self.start..self.start + have])
     }
 
     #[inline]
@@ -293,69 +267,14 @@ impl<R: Read> Reader<R> {
         Ok(self.fill(1)? == 0)
     }
 
-    /// Reads to the end of the input and returns how many bytes that were.
-    pub(crate) fn skip_rest(&mut self) -> Result<u64> {
+    /// Reads on to the end of the input, or at least `most` bytes, and returns how many bytes that were.
+    pub(crate) fn skip(&mut self, most: u64) -> Result<u64> {
         let from = self.offset;
         loop {
             match self.fill(1)? {
-                0 => return Ok(self.offset - from),
-                n => self.advance(n),
+                n if n > 0 && self.offset - from < most => self.advance(n),
+                _ => return Ok(self.offset - from),
             }
         }
-    }
-}
-
-/// Three floats from twelve bytes.
-#[inline]
-pub(crate) fn vec3f(bytes: &[u8; 12]) -> [f32; 3] {
-    let b = bytes;
-    [
-        f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
-        f32::from_le_bytes([b[4], b[5], b[6], b[7]]),
-        f32::from_le_bytes([b[8], b[9], b[10], b[11]]),
-    ]
-}
-
-/// Buffered little-endian writer; call [`Writer::finish`] at the end.
-pub(crate) struct Writer<W: Write> {
-    sink: W,
-    buffer: Vec<u8>,
-}
-
-impl<W: Write> Writer<W> {
-    pub(crate) fn new(sink: W) -> Self {
-        Writer { sink, buffer: Vec::with_capacity(64 << 10) }
-    }
-
-    #[inline]
-    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> Result<()> {
-        self.buffer.extend_from_slice(bytes);
-        if self.buffer.len() >= BUFFER {
-            self.sink.write_all(&self.buffer)?;
-            self.buffer.clear();
-        }
-        Ok(())
-    }
-
-    pub(crate) fn u32(&mut self, value: u32) -> Result<()> {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    pub(crate) fn u64(&mut self, value: u64) -> Result<()> {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    pub(crate) fn f32s(&mut self, values: &[f32]) -> Result<()> {
-        values.iter().try_for_each(|v| self.bytes(&v.to_le_bytes()))
-    }
-
-    pub(crate) fn f64s(&mut self, values: &[f64]) -> Result<()> {
-        values.iter().try_for_each(|v| self.bytes(&v.to_le_bytes()))
-    }
-
-    /// Hands everything to the sink and flushes it.
-    pub(crate) fn finish(mut self) -> Result<()> {
-        self.sink.write_all(&self.buffer)?;
-        Ok(self.sink.flush()?)
     }
 }

@@ -1,0 +1,31 @@
+//! How good is a result: clouds and depth maps against ground truth.
+
+mod cloud;
+mod labels;
+mod maps;
+mod nearest;
+
+pub use cloud::{
+    ClassScore, ClassScores, CloudScoreOptions, CloudScores, DistanceScore, LabelledPoints, cloud_scores,
+};
+pub use labels::LabelScores;
+pub use maps::{MapScoreOptions, MapScores, map_scores};
+
+/// `value` to so many decimals.
+fn round_to<const DECIMALS: i32>(value: f64) -> f64 {
+    let scale = 10f64.powi(DECIMALS);
+    (value * scale).round() / scale
+}
+
+/// Serializes a number to so many decimals.
+fn rounded<const DECIMALS: i32, S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(round_to::<DECIMALS>(*value))
+}
+
+/// Serializes a number, if there is one, to so many decimals.
+fn rounded_option<const DECIMALS: i32, S: serde::Serializer>(
+    value: &Option<f64>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serde::Serialize::serialize(&value.map(round_to::<DECIMALS>), serializer)
+}

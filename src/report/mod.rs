@@ -1,0 +1,9 @@
+//! What a run did: tables for people, JSON for programs.
+
+mod classes;
+mod run;
+mod table;
+
+pub use classes::{ClassRow, class_table, fill_shares};
+pub use run::{OutputReport, RunReport, StageTime, ViewReport};
+pub use table::{Align, Table, grouped};
