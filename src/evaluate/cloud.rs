@@ -192,9 +192,10 @@ pub fn cloud_scores(
     }
 
     let cut = 10.0 * largest;
-    let to_truth = neighbors(&cloud.positions, &truth.positions, cut);
-    let to_cloud: Vec<f64> =
-        neighbors(&truth.positions, &cloud.positions, cut).iter().map(|n| distance(*n)).collect();
+    let (in_cloud, in_truth) =
+        rayon::join(|| NearestIndex::new(&cloud.positions), || NearestIndex::new(&truth.positions));
+    let to_truth = in_cloud.nearest_in(&in_truth, cut);
+    let to_cloud: Vec<f64> = in_truth.nearest_in(&in_cloud, cut).into_iter().map(distance).collect();
     let scores = thresholds.iter().map(|&t| {
         let accuracy = share(to_truth.iter(), |n| distance(**n) < t).unwrap_or(0.0);
         let of_counted = to_cloud.iter().zip(&counted).filter(|c| *c.1).map(|c| c.0);
@@ -256,12 +257,6 @@ fn thinned(cloud: &LabelledPoints, voxel: f64) -> LabelledPoints {
     let mut first: Vec<usize> = keys.iter().map(|k| k.1).collect();
     first.par_sort_unstable();
     cloud.chosen(&first)
-}
-
-/// For every point of `from` the nearest of `to` that is nearer than `radius`.
-fn neighbors(from: &[[f64; 3]], to: &[[f64; 3]], radius: f64) -> Vec<Option<Nearest>> {
-    let index = NearestIndex::new(to);
-    from.par_iter().map(|p| index.nearest_within(p, radius)).collect()
 }
 
 pub(super) fn distance(nearest: Option<Nearest>) -> f64 {

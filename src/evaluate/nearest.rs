@@ -1,5 +1,7 @@
 //! Nearest neighbours among points that do not change.
 
+use rayon::prelude::*;
+
 /// Points per leaf.
 const LEAF: usize = 12;
 /// Subtrees smaller than this are built by one thread.
@@ -44,6 +46,18 @@ impl NearestIndex {
         let (min, max) = bounds(&points);
         build(&mut points, &mut nodes, (min, max));
         NearestIndex { points, nodes, levels, min, max }
+    }
+
+    /// For every point that this index was built from, in that order, the nearest of `others` that is nearer than
+    /// `radius`.
+    pub(crate) fn nearest_in(&self, others: &NearestIndex, radius: f64) -> Vec<Option<Nearest>> {
+        // neighbouring queries one after the other walk through the same memory
+        let found: Vec<_> = self.points.par_iter().map(|(p, _)| others.nearest_within(p, radius)).collect();
+        let mut in_order = vec![None; found.len()];
+        for ((_, index), nearest) in self.points.iter().zip(found) {
+            in_order[*index as usize] = nearest;
+        }
+        in_order
     }
 
     /// The point nearest to `query` among those nearer than `radius`.
