@@ -63,16 +63,26 @@ impl DepthStore {
     /// Whether the folder holds a usable map of the view with this global ID and camera (at the size of the maps).
     /// Reads the header only.
     pub fn existing(&self, id: ImageId, camera: &Camera) -> Existing {
-        let path = self.path(id);
-        if !path.exists() {
-            return Existing::Absent;
-        }
-        match read_header(&path, &self.limits) {
-            Err(error) => Existing::Unusable(Error::format(&path, error).to_string()),
-            Ok(header) => match difference(&header, id, camera) {
-                Some(what) => Existing::Unusable(format!("{}: {what}", path.display())),
+        match self.header(id) {
+            Err(error) => Existing::Unusable(error.to_string()),
+            Ok(None) => Existing::Absent,
+            Ok(Some(header)) => match difference(&header, id, camera) {
+                Some(what) => Existing::Unusable(format!("{}: {what}", self.path(id).display())),
                 None => Existing::Usable,
             },
+        }
+    }
+
+    /// What the depth map of a view says before its planes; `None` if there is no file.
+    ///
+    /// # Errors
+    /// The file cannot be read or is damaged.
+    pub fn header(&self, id: ImageId) -> Result<Option<DepthMapHeader>> {
+        let path = self.path(id);
+        match read_header(&path, &self.limits) {
+            Ok(header) => Ok(Some(header)),
+            Err(semvs_formats::Error::Io(e)) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Error::format(&path, error)),
         }
     }
 
@@ -124,6 +134,12 @@ impl DepthStore {
         std::fs::rename(&pending, &path).map_err(|e| Error::io(&pending, "rename", e))?;
         self.cache.remove(id);
         Ok(())
+    }
+
+    /// Deletes the pending depth map of a view, if there is one and it can be.
+    pub fn discard_pending(&self, id: ImageId) {
+        // What remains is overwritten by the next run.
+        let _ = std::fs::remove_file(self.pending_path(id));
     }
 
     /// Deletes the depth map of a view, if there is one.
@@ -264,6 +280,10 @@ mod tests {
         store.write_pending(&estimate(5, 3.0)).unwrap();
         assert_eq!(depth(), 2.0);
         store.publish(ImageId(5)).unwrap();
+        assert_eq!(depth(), 3.0);
+        store.write_pending(&estimate(5, 4.0)).unwrap();
+        store.discard_pending(ImageId(5));
+        store.discard_pending(ImageId(5));
         assert_eq!(depth(), 3.0);
         assert!(store.publish(ImageId(5)).is_err());
         store.delete(ImageId(5)).unwrap();

@@ -1,7 +1,7 @@
 //! Every access to files: scenes, photographs, masks, depth maps, clouds.
 
 pub mod atomic;
-mod byte_cache;
+pub(crate) mod byte_cache;
 pub mod cameras;
 pub mod cloud;
 mod cloud_names;

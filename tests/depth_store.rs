@@ -1,0 +1,75 @@
+//! Depth maps that OpenMVS wrote, held against the scene that they belong to.
+#![allow(clippy::unwrap_used)]
+
+use semvs::scene::{ImageId, ResolutionOptions};
+use semvs::store::cameras::working_cameras;
+use semvs::store::depth_store::{DepthStore, Existing};
+use semvs::store::import::load_scene;
+use semvs::store::paths::SearchPath;
+use semvs_formats::Limits;
+use std::path::{Path, PathBuf};
+
+fn facade() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("compat-fixtures/facade6")
+}
+
+/// A folder with the decompressed final maps.
+fn unpacked() -> tempfile::TempDir {
+    let scratch = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(facade().join("openmvs-2.3.0/post7")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if let Some(name) = name.strip_suffix(".zst").filter(|name| name.ends_with(".dmap")) {
+            let bytes = zstd::decode_all(std::fs::File::open(&path).unwrap()).unwrap();
+            std::fs::write(scratch.path().join(name), bytes).unwrap();
+        }
+    }
+    scratch
+}
+
+fn store(folder: &Path) -> DepthStore {
+    let images = SearchPath { working_folder: facade(), scene_folder: facade() };
+    DepthStore::new(folder, images, 64 << 20, Limits::default())
+}
+
+/// The maps are half the size of the photographs.
+const HALF: ResolutionOptions = ResolutionOptions { level: 1, min: 100, max: 2560 };
+
+#[test]
+fn maps_of_openmvs_belong_to_their_scene_and_only_to_its_size() {
+    let scratch = unpacked();
+    let store = store(scratch.path());
+    let scene = load_scene(&facade().join("scene.mvs"), &facade(), &Limits::default()).unwrap();
+    let cameras = working_cameras(&scene, &HALF, true).unwrap();
+    let full = ResolutionOptions { level: 0, ..HALF };
+    let large = working_cameras(&scene, &full, true).unwrap();
+    for (i, view) in scene.scene.views.iter().enumerate() {
+        let existing = |id: ImageId, cameras: &[Option<semvs::geometry::Camera>]| {
+            store.existing(id, cameras[i].as_ref().unwrap())
+        };
+        let own = existing(view.id, &cameras);
+        assert!(matches!(own, Existing::Usable), "{}: {own:?}", view.name);
+        assert!(
+            matches!(existing(view.id, &large), Existing::Unusable(why) if why.contains("200×150 pixels instead of 400×300"))
+        );
+        let next = ImageId((view.id.0 + 1) % 6);
+        assert!(matches!(existing(next, &cameras), Existing::Unusable(why) if why.contains("its camera")));
+        assert!(matches!(existing(ImageId(77), &cameras), Existing::Absent));
+    }
+}
+
+#[test]
+fn maps_of_openmvs_are_written_back_byte_for_byte() {
+    let scratch = unpacked();
+    let (from, to) = (store(scratch.path()), store(&scratch.path().join("copy")));
+    for id in (0..6).map(ImageId) {
+        let estimate = from.read(id).unwrap();
+        let valid = estimate.depth.data().iter().filter(|&&d| d > 0.0).count();
+        assert!(valid > estimate.depth.size().area() / 2, "{id}: {valid} depths");
+        let name = &estimate.image_name;
+        assert!(name.starts_with("images/") || name.contains("/images/"), "{name}");
+        semvs::store::depth_store::write_depth_map(&to.path(id), &estimate, name).unwrap();
+        let bytes = |store: &DepthStore| std::fs::read(store.path(id)).unwrap();
+        assert!(bytes(&from) == bytes(&to), "{id}");
+    }
+}
