@@ -17,6 +17,14 @@ pub struct Obb {
     pub half_extent: [f64; 3],
 }
 
+impl Obb {
+    /// Whether it is finite and has a volume, and the rows of its rotation are orthonormal within 1e-3.
+    pub fn is_valid(&self) -> bool {
+        let finite = self.center.iter().chain(&self.half_extent).all(|v| v.is_finite());
+        finite && self.half_extent.iter().all(|&v| v > 0.0) && is_orthonormal(&self.rotation)
+    }
+}
+
 /// A region of interest as a file spells it, kept so that rewriting a file reproduces its bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StoredBox {
@@ -43,10 +51,7 @@ pub enum StoredBox {
 impl StoredBox {
     /// The box that the bytes mean; `None` if it has no volume, is not finite or not rotated properly.
     pub fn decode(&self) -> Option<Obb> {
-        let obb = self.as_obb();
-        let finite = obb.center.iter().chain(&obb.half_extent).all(|v| v.is_finite());
-        let volume = obb.half_extent.iter().all(|&v| v > 0.0);
-        (finite && volume && is_orthonormal(&obb.rotation)).then_some(obb)
+        Some(self.as_obb()).filter(Obb::is_valid)
     }
 
     /// The numbers of the box, good or bad.

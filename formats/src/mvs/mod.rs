@@ -6,6 +6,7 @@ mod check;
 mod interface;
 mod mesh;
 mod project;
+mod repair;
 mod scene;
 
 use std::io::{Read, Write};
@@ -15,6 +16,7 @@ pub use boxes::{Obb, StoredBox};
 pub use interface::{NEWEST_VERSION, write_interface};
 pub use mesh::{IndexLists, Mesh, Texture};
 pub use project::{ArchiveKind, write_project};
+pub use repair::Repairs;
 pub use scene::{Camera, Image, Line, NO_ID, Platform, PointCloud, Pose, Scene, ViewScore, Visibility};
 
 use crate::wire::{self, Place, Reader};

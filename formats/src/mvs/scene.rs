@@ -161,6 +161,13 @@ pub struct Image {
     pub view_scores: Vec<ViewScore>,
 }
 
+impl Image {
+    /// The global ID of the image at position `index`: `id`, or the position if that is [`NO_ID`].
+    pub fn id_at(&self, index: usize) -> u32 {
+        if self.id == NO_ID { index as u32 } else { self.id }
+    }
+}
+
 /// How well another image matches an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ViewScore {

@@ -23,8 +23,8 @@ pub(crate) fn shared(path: &str) -> Option<Vec<u8>> {
     bytes
 }
 
-/// Calls `read` with every prefix of `bytes` and with `bytes` after each single-byte change, and checks that
-/// it comes back with a value or an error that has a place and a message.
+/// Calls `read` with every prefix of `bytes`, with `bytes` after each single-byte change, and with absurd numbers at
+/// every place, and checks that it comes back with a value or an error of one line that blames the file.
 pub(crate) fn damage(bytes: &[u8], read: impl Fn(&[u8]) -> Result<(), Error>) {
     let check = |bytes: &[u8]| {
         if let Err(e) = read(bytes) {
@@ -42,6 +42,14 @@ pub(crate) fn damage(bytes: &[u8], read: impl Fn(&[u8]) -> Result<(), Error>) {
             check(&changed);
         }
         changed[i] = bytes[i];
+    }
+    // Counts that no file holds, wherever there may be one.
+    for i in 0..bytes.len().saturating_sub(8) {
+        for count in [u64::MAX, i64::MAX as u64, 1 << 40, 1 << 32, u32::MAX.into(), 1 << 20, 1 << 16] {
+            changed[i..i + 8].copy_from_slice(&count.to_le_bytes());
+            check(&changed);
+        }
+        changed[i..i + 8].copy_from_slice(&bytes[i..i + 8]);
     }
 }
 
