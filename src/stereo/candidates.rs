@@ -18,6 +18,10 @@ const CELL_STEP: usize = 3;
 const SHIFT_RANGE: f32 = 0.45;
 /// Random change of slope, in pixels of shift per pixel.
 const SLOPE_RANGE: f32 = 0.06;
+/// Steeper surfaces are shaken more: the slope's range grows with 1 + tan² of the tilt, up to this factor.
+const STEEP: f32 = 12.0;
+/// Largest slope of a random plane against the image plane (tangent of the tilt).
+const MAX_SLOPE: f32 = 4.5;
 /// A pixel farther than this, in pixels of shift, from the plane fitted does not take part.
 const FIT_GATE: f32 = 1.5;
 /// Pixels costlier than this do not take part in fits.
@@ -82,12 +86,13 @@ pub(crate) fn beside(
     })
 }
 
-/// A random plane anywhere in the depth range.
+/// A random plane anywhere in the depth range, tilted in any direction; steep tilts are rarer than flat ones.
 pub(crate) fn random(level: &Level, rng: &mut Rng) -> InversePlane {
     let (low, high) = level.w_range;
     let w = low + (high - low) * rng.unit();
-    let (sx, sy) = (0.8 * rng.signed(), 0.8 * rng.signed());
-    InversePlane { w, wx: sx * w / level.pinhole.fx, wy: sy * w / level.pinhole.fy }
+    let (sx, sy) = (rng.signed(), rng.signed());
+    let stretch = 1.0 / (1.0 + 1.0 / MAX_SLOPE - sx.abs().max(sy.abs()));
+    InversePlane { w, wx: sx * stretch * w / level.pinhole.fx, wy: sy * stretch * w / level.pinhole.fy }
 }
 
 /// The plane of pixel `(x, y)`, shaken about that pixel, anchored at the tile's centre. `strength` 1 is the widest.
@@ -101,7 +106,9 @@ pub(crate) fn shaken(
 ) -> InversePlane {
     let p = tile.pixel_plane(x, y);
     let shift = strength * SHIFT_RANGE / level.pixels_per_w;
-    let slope = strength * SLOPE_RANGE / level.pixels_per_w;
+    let (gx, gy) = (p.wx * level.pinhole.fx / p.w, p.wy * level.pinhole.fy / p.w);
+    let steepness = (1.0 + gx * gx + gy * gy).min(STEEP);
+    let slope = strength * SLOPE_RANGE * steepness / level.pixels_per_w;
     InversePlane {
         w: p.w + shift * rng.signed(),
         wx: p.wx + slope * rng.signed(),

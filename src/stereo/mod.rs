@@ -14,6 +14,8 @@ mod problem;
 mod rng;
 mod solver;
 mod state;
+#[cfg(test)]
+mod tests;
 mod tile;
 
 pub use cost::CpuLevel;

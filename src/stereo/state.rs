@@ -75,14 +75,11 @@ impl State {
     /// The start at the coarsest level: random planes, then the planes of the sparse points.
     pub(crate) fn random(level: &Level, problem: &StereoProblem, view: u32, seed: u64) -> Self {
         let mut s = State::empty(level.size, problem.skip.as_ref());
-        let (low, high) = level.w_range;
         for y in 0..level.size.height as i32 {
             let mut rng = Rng::keyed(seed, view, INIT_PASS, y as u32);
             for x in 0..level.size.width as i32 {
                 let at = s.at(x, y);
-                let w = low + (high - low) * rng.unit();
-                let (sx, sy) = (0.6 * rng.signed(), 0.6 * rng.signed());
-                s.set(at, InversePlane { w, wx: sx * w / level.pinhole.fx, wy: sy * w / level.pinhole.fy });
+                s.set(at, super::candidates::random(level, &mut rng));
             }
         }
         let full = problem.reference.gray.size();

@@ -93,8 +93,6 @@ pub(crate) struct Scratch {
     pub(crate) warped: [WinRow; WIN_H],
     /// 1 where the warped sample lies inside the source.
     pub(crate) valid: [WinRow; WIN_H],
-    /// Cost of the view at hand.
-    pub(crate) cost: TileMap,
     /// Smallest cost over the views so far.
     pub(crate) best: TileMap,
     /// Second smallest.
@@ -146,7 +144,6 @@ impl Tile {
             scratch: Scratch {
                 warped: ZERO_WIN,
                 valid: ZERO_WIN,
-                cost: ZERO_TILE,
                 best: ZERO_TILE,
                 second: ZERO_TILE,
                 smooth: ZERO_HALO,

@@ -5,6 +5,8 @@
 //! give the same bytes.
 
 mod math;
+#[cfg(test)]
+mod oracle_tests;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
