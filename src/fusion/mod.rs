@@ -26,3 +26,6 @@ pub use plan::{FusionView, MapInfo};
 pub use stream::{FusionInput, fuse};
 pub use summary::{ClassCounts, FusionSummary};
 pub use unfused::project_maps;
+
+#[cfg(test)]
+mod tests;
