@@ -6,6 +6,7 @@
 
 mod consistency;
 mod gaps;
+mod normals;
 mod options;
 mod speckle;
 mod warp;
@@ -14,6 +15,7 @@ use crate::scene::{DepthEstimate, LabelMap};
 
 pub use consistency::{MAX_NEIGHBORS, filter_consistency};
 pub use gaps::fill_gaps;
+pub use normals::normals_from_depth;
 pub use options::DepthFilterOptions;
 pub use speckle::remove_speckles;
 

@@ -11,6 +11,7 @@ mod correspond;
 mod lens;
 mod maps;
 mod merge;
+mod normals;
 mod options;
 mod order;
 mod plan;
@@ -21,6 +22,7 @@ mod unfused;
 mod working_set;
 
 pub use maps::{FusionMaps, MapSource};
+pub use normals::WithNormals;
 pub use options::{AttributeSource, FusionOptions};
 pub use plan::{FusionView, MapInfo};
 pub use stream::{FusionInput, fuse};
