@@ -68,9 +68,7 @@ impl Accumulator {
             self.normal[axis] += normal[axis] * weight;
         }
         if let Some(color) = view.color {
-            for channel in 0..3 {
-                self.color[channel] += f32::from(color[i][channel]) * weight;
-            }
+            self.color.iter_mut().zip(color[i]).for_each(|(sum, c)| *sum += f32::from(c) * weight);
         }
         self.weight += f64::from(weight);
         let at = self.views.partition_point(|&v| v < view.view);
