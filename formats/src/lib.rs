@@ -26,12 +26,15 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod colmap;
 pub mod dmap;
 mod error;
 pub mod mvs;
 pub mod neighbors_file;
+mod number;
 pub mod ply;
 pub mod roi;
+mod source;
 mod text;
 mod wire;
 

@@ -45,60 +45,10 @@ pub(super) fn pack_line(line: &[u8], element: &Element, offset: u64, out: &mut V
     Ok(())
 }
 
-/// Appends `value` as C's `%g` prints it (6 significant digits) and a space.
-pub(super) fn push_number(value: f64, out: &mut Vec<u8>) {
-    out.extend(general(value).as_bytes());
-    out.push(b' ');
-}
-
-fn general(value: f64) -> String {
-    const DIGITS: i32 = 6;
-    if !value.is_finite() {
-        let name = if value.is_nan() { "nan" } else { "inf" };
-        return if value.is_sign_negative() { format!("-{name}") } else { name.into() };
-    }
-    let scientific = format!("{value:.*e}", DIGITS as usize - 1);
-    let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific };
-    let exponent: i32 = exponent.parse().unwrap_or(0);
-    if (-4..DIGITS).contains(&exponent) {
-        trim(&format!("{value:.*}", (DIGITS - 1 - exponent) as usize)).to_owned()
-    } else {
-        let sign = if exponent < 0 { '-' } else { '+' };
-        format!("{}e{sign}{:02}", trim(mantissa), exponent.abs())
-    }
-}
-
-/// Without the zeros that end a decimal fraction.
-fn trim(number: &str) -> &str {
-    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ply::header::Property;
-
-    #[test]
-    fn numbers_are_printed_as_c_prints_them() {
-        let cases = [
-            (0.0, "0"),
-            (-0.0, "-0"),
-            (1.0, "1"),
-            (-3.75, "-3.75"),
-            (100_000.0, "100000"),
-            (1_000_000.0, "1e+06"),
-            (999_999.5, "1e+06"),
-            (123_456.7, "123457"),
-            (0.000_1, "0.0001"),
-            (0.000_012_345_678, "1.23457e-05"),
-            (1.0 / 3.0, "0.333333"),
-            (-1e-100, "-1e-100"),
-            (f64::INFINITY, "inf"),
-        ];
-        for (value, expected) in cases {
-            assert_eq!(general(value), expected);
-        }
-    }
 
     #[test]
     fn values_that_the_declared_type_cannot_hold_are_refused() {

@@ -1,6 +1,6 @@
 //! The header of a PLY file: encoding, comments, elements and their properties.
 
-use super::source::Source;
+use crate::source::Source;
 use crate::{Error, Limits, Result};
 use std::io::Read;
 

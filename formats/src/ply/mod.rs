@@ -17,7 +17,6 @@ mod header;
 mod layout;
 mod read;
 mod record;
-mod source;
 #[cfg(test)]
 mod tests;
 mod write;

@@ -4,7 +4,7 @@ use super::ascii::pack_line;
 use super::cloud::Cloud;
 use super::header::{Element, Encoding, Header, PropertyType, ScalarType, broken};
 use super::record::{Block, Place, RecordLayout};
-use super::source::Source;
+use crate::source::Source;
 use crate::{Error, Limits, Result};
 use std::io::Read;
 

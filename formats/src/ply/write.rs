@@ -1,9 +1,9 @@
 //! Streaming writer of point clouds.
 
-use super::ascii::push_number;
 use super::cloud::Cloud;
 use super::header::Encoding;
 use super::layout::{Field, Layout};
+use crate::number::general;
 use crate::{Error, Result};
 use std::io::Write;
 
@@ -158,7 +158,10 @@ impl Sink for Ascii<'_> {
         }
     }
     fn floats(&mut self, values: &[f32]) {
-        values.iter().for_each(|v| push_number(f64::from(*v), self.0));
+        for value in values {
+            self.0.extend(general(f64::from(*value), 6).bytes());
+            self.0.push(b' ');
+        }
     }
     fn doubles(&mut self, values: &[f64]) {
         for value in values {

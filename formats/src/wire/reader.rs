@@ -65,6 +65,11 @@ impl<R: Read> Reader<R> {
         self.length.map(|n| n.saturating_sub(self.offset))
     }
 
+    /// Longest string allowed, in bytes.
+    pub(crate) fn max_string(&self) -> u64 {
+        self.limits.max_string
+    }
+
     /// Caps what may still be allocated, for inputs whose values cannot need more.
     pub(crate) fn cap_budget(&mut self, bytes: u64) {
         self.budget = self.budget.min(bytes);

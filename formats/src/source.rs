@@ -7,7 +7,7 @@ use std::io::{ErrorKind, Read};
 const BLOCK: usize = 256 << 10;
 
 /// A reader with a window of bytes that are read but not consumed.
-pub(super) struct Source<R> {
+pub(crate) struct Source<R> {
     inner: R,
     buffer: Vec<u8>,
     start: usize,
@@ -17,28 +17,28 @@ pub(super) struct Source<R> {
 }
 
 impl<R: Read> Source<R> {
-    pub(super) fn new(inner: R) -> Self {
+    pub(crate) fn new(inner: R) -> Self {
         Source { inner, buffer: vec![0; BLOCK], start: 0, end: 0, consumed: 0, ended: false }
     }
 
     /// Offset in the file of the first byte not consumed.
-    pub(super) fn offset(&self) -> u64 {
+    pub(crate) fn offset(&self) -> u64 {
         self.consumed
     }
 
     /// Bytes read but not consumed.
-    pub(super) fn window(&self) -> &[u8] {
+    pub(crate) fn window(&self) -> &[u8] {
         &self.buffer[self.start..self.end]
     }
 
-    pub(super) fn consume(&mut self, bytes: usize) {
+    pub(crate) fn consume(&mut self, bytes: usize) {
         debug_assert!(bytes <= self.end - self.start);
         self.start += bytes;
         self.consumed += bytes as u64;
     }
 
     /// Reads on; false at the end of the file. A full window is doubled, so it grows only with bytes that exist.
-    pub(super) fn fill(&mut self) -> Result<bool> {
+    pub(crate) fn fill(&mut self) -> Result<bool> {
         if self.start > 0 {
             self.buffer.copy_within(self.start..self.end, 0);
             self.end -= self.start;
@@ -60,7 +60,7 @@ impl<R: Read> Source<R> {
     }
 
     /// Consumes a line into `line` without its `\n` or `\r\n`; false, with an empty line, at the end of the file.
-    pub(super) fn line(&mut self, line: &mut Vec<u8>, max: u64, field: &str) -> Result<bool> {
+    pub(crate) fn line(&mut self, line: &mut Vec<u8>, max: u64, field: &str) -> Result<bool> {
         line.clear();
         let mut searched = 0;
         let (length, skip) = loop {
