@@ -161,6 +161,14 @@ impl DepthStore {
     }
 }
 
+/// Reads what the depth map at `path` says before its planes.
+///
+/// # Errors
+/// [`Error`] about `path`.
+pub fn read_depth_header(path: &Path, limits: Limits) -> Result<DepthMapHeader> {
+    read_header(path, &limits).map_err(|e| Error::format(path, e))
+}
+
 /// Reads the depth map at `path`. Its `image_name` is the file's: relative to the folder of the depth map.
 ///
 /// # Errors
