@@ -10,47 +10,36 @@ pub fn void_borders(labels: &LabelMap, width: u32) -> LabelMap {
     if width == 0 || labels.size().area() == 0 {
         return labels.clone();
     }
-    let distance = border_distance(labels);
+    let lowest = over_window(labels, width as usize, u16::min);
+    let highest = over_window(labels, width as usize, u16::max);
     let mut out = labels.clone();
-    for (label, &d) in out.data_mut().iter_mut().zip(distance.data()) {
-        if d <= width {
+    for (label, (low, high)) in out.data_mut().iter_mut().zip(lowest.into_iter().zip(highest)) {
+        if low != high {
             *label = 0;
         }
     }
     out
 }
 
-/// Chessboard distance of every pixel to the nearest pixel of another id; `u32::MAX` where there is none.
-///
-/// Two sweeps (Rosenfeld and Pfaltz 1968): exact, because on the way to the nearest pixel of another id every step
-/// stays within the own id until the last.
-fn border_distance(labels: &LabelMap) -> Grid<u32> {
-    let (width, height) = (labels.width(), labels.height());
-    let mut distance = Grid::filled(labels.size(), u32::MAX);
-    let mut visit = |x: usize, y: usize, neighbors: [(isize, isize); 4]| {
-        let here = labels[(x, y)];
-        let mut best = distance[(x, y)];
-        for (dx, dy) in neighbors {
-            let (Some(nx), Some(ny)) = (x.checked_add_signed(dx), y.checked_add_signed(dy)) else { continue };
-            if nx >= width || ny >= height {
-                continue;
-            }
-            let there = if labels[(nx, ny)] == here { distance[(nx, ny)].saturating_add(1) } else { 1 };
-            best = best.min(there);
-        }
-        distance[(x, y)] = best;
-    };
-    for y in 0..height {
-        for x in 0..width {
-            visit(x, y, [(-1, -1), (0, -1), (1, -1), (-1, 0)]);
-        }
+/// The extreme, in the sense of `pick`, of the ids within `radius` columns and rows of every pixel.
+fn over_window(labels: &LabelMap, radius: usize, pick: impl Fn(u16, u16) -> u16) -> Vec<u16> {
+    let width = labels.width();
+    let mut out = labels.data().to_vec();
+    for (row, source) in out.chunks_exact_mut(width).zip(labels.data().chunks_exact(width)) {
+        over_line(row, source, radius, 1, &pick);
     }
-    for y in (0..height).rev() {
-        for x in (0..width).rev() {
-            visit(x, y, [(1, 1), (0, 1), (-1, 1), (1, 0)]);
-        }
+    let rows = out.clone();
+    over_line(&mut out, &rows, radius, width, &pick);
+    out
+}
+
+/// Folds into every value of `out` the values of `source` up to `radius` strides before and after it.
+fn over_line(out: &mut [u16], source: &[u16], radius: usize, stride: usize, pick: impl Fn(u16, u16) -> u16) {
+    let strides = (1..=radius).map(|s| s * stride).take_while(|&shift| shift < source.len());
+    for shift in strides {
+        out[shift..].iter_mut().zip(source).for_each(|(o, &v)| *o = pick(*o, v));
+        out.iter_mut().zip(&source[shift..]).for_each(|(o, &v)| *o = pick(*o, v));
     }
-    distance
 }
 
 #[cfg(test)]
