@@ -1,6 +1,6 @@
 //! What of a label map is certain.
 
-use crate::scene::{Grid, LabelMap};
+use crate::scene::LabelMap;
 
 /// The labels with every pixel within `width` pixels of a pixel of another id set to void.
 ///
@@ -46,6 +46,7 @@ fn over_line(out: &mut [u16], source: &[u16], radius: usize, stride: usize, pick
 mod tests {
     use super::*;
     use crate::geometry::Size;
+    use crate::scene::Grid;
 
     fn map(rows: &[&[u16]]) -> LabelMap {
         let size = Size::new(rows[0].len() as u32, rows.len() as u32);
