@@ -120,3 +120,36 @@ fn one_bad_photograph_drops_its_view_and_strictness_makes_it_an_error() {
     let error = working_cameras(&loaded, &resolution(1, 160), false).unwrap_err().to_string();
     assert!(error.contains("1 of its 6 images") && error.contains("working folder"), "{error}");
 }
+
+#[test]
+fn the_estimated_region_equals_openmvs() {
+    use semvs::scene::{RoiEstimation, estimate_roi};
+    // Printed by OpenMVS with six decimals.
+    const TOLERANCE: f64 = 1e-6;
+    let Some(folder) = extra("reference/tests4") else { return };
+    let scene = load(&folder.join("scene.mvs")).scene;
+    assert_eq!(estimate_roi(&scene, RoiEstimation::ObjectScan), None, "the cameras look the same way");
+    let roi = estimate_roi(&scene, RoiEstimation::Always).unwrap();
+    let close = |got: &nalgebra::Vector3<f64>, want: [f64; 3]| {
+        got.iter().zip(want).all(|(g, w)| (g - w).abs() <= TOLERANCE)
+    };
+    assert!(close(&roi.center, [0.569575, -0.991925, -3.074815]), "{}", roi.center);
+    assert!(close(&roi.half_extent, [5.386892, 3.184098, 4.547450]), "{}", roi.half_extent);
+}
+
+#[test]
+fn depth_ranges_equal_those_of_openmvs_maps() {
+    use semvs::scene::SparseInit;
+    let folder = root().join("compat-fixtures/facade6");
+    let loaded = load(&folder.join("scene.mvs"));
+    let (cameras, views) = select(&loaded, &resolution(1, 160));
+    for (i, (camera, view)) in cameras.iter().zip(&views).enumerate() {
+        let file = folder.join(format!("openmvs-2.3.0/raw/depth{i:04}.dmap.zst"));
+        let bytes = zstd::decode_all(std::fs::File::open(file).unwrap()).unwrap();
+        let f32_at = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        let init = SparseInit::new(&loaded.scene.tracks, &view.tracks, camera.as_ref().unwrap());
+        assert_eq!(init.range, (f32_at(20), f32_at(24)), "view {i}");
+        let with_normal = init.points.iter().filter(|p| p.normal.is_some()).count();
+        assert!(with_normal > init.points.len() * 9 / 10);
+    }
+}

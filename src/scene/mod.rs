@@ -1,6 +1,7 @@
 //! The scene: views, sparse tracks, neighbours, and the rasters that belong to a view.
 
 mod cloud;
+mod depth_range;
 mod grid;
 mod ids;
 mod maps;
@@ -9,10 +10,12 @@ mod neighbor_scores;
 mod neighbors;
 mod resample;
 mod resolution;
+mod roi_estimate;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
 pub use cloud::{CloudLayout, CloudPoint, PointCloud, PointSink, PointSource};
+pub use depth_range::{DEFAULT_DEPTH_RANGE, SparseInit, SparsePoint};
 pub use grid::Grid;
 pub use ids::{ImageId, ViewIndex};
 pub use maps::{ColorImage, ConfidenceMap, DepthEstimate, DepthMap, GrayImage, LabelMap, NormalMap};
@@ -21,3 +24,4 @@ pub use neighbors::{NeighborOptions, OutsideRoi, ViewNeighbors, override_neighbo
 pub(crate) use resample::area_rgb;
 pub use resample::{area_color, gray_from_color, resize_gray, resize_nearest};
 pub use resolution::{ResolutionOptions, scaled_size};
+pub use roi_estimate::{RoiEstimation, estimate_roi};
