@@ -1,6 +1,7 @@
 //! One view to estimate and what it is matched with.
 
 use crate::geometry::Camera;
+pub use crate::scene::SparsePoint;
 use crate::scene::{GrayImage, Grid, ImageId};
 use std::sync::Arc;
 
@@ -13,19 +14,6 @@ pub struct SourceImage {
     pub camera: Camera,
     /// Global ID of the view.
     pub id: ImageId,
-}
-
-/// A sparse point seen by the reference view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparsePoint {
-    /// Column in the reference image, pixels.
-    pub x: f32,
-    /// Row in the reference image, pixels.
-    pub y: f32,
-    /// Depth along the reference's optical axis.
-    pub depth: f32,
-    /// Surface normal in the camera frame, facing the camera, if one could be derived.
-    pub normal: Option<[f32; 3]>,
 }
 
 /// One reference view, the source views it is matched with, and what is known beforehand.
