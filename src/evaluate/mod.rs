@@ -1,12 +1,17 @@
-//! How good is a result: clouds and depth maps against ground truth.
+//! How good is a result: clouds and depth maps against ground truth, and against each other.
 
 mod cloud;
+mod compare;
 mod labels;
 mod maps;
 mod nearest;
 
 pub use cloud::{
     ClassScore, ClassScores, CloudScoreOptions, CloudScores, DistanceScore, LabelledPoints, cloud_scores,
+};
+pub use compare::{
+    Agreement, CloudComparison, CompareOptions, Differences, FirstDifference, MapComparison, compare_clouds,
+    compare_maps,
 };
 pub use labels::LabelScores;
 pub use maps::{MapScoreOptions, MapScores, map_scores};

@@ -1,0 +1,197 @@
+//! How two results differ, element by element: for regression tests against an earlier run or another program.
+
+mod clouds;
+mod maps;
+
+pub use clouds::{CloudComparison, compare_clouds};
+pub use maps::{MapComparison, compare_maps};
+
+use crate::error::{Error, Result};
+use serde::Serialize;
+
+/// Up to which difference two values count as the same when the first differing element is looked for. All default
+/// to 0: any difference counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CompareOptions {
+    /// Relative difference of depths.
+    pub depth: f64,
+    /// Distance of positions as a share of the diagonal of the second cloud's bounding box.
+    pub position: f64,
+    /// Angle between normals, degrees.
+    pub normal_deg: f64,
+    /// Difference of a colour channel, levels.
+    pub color: u8,
+    /// Relative difference of confidences and weights.
+    pub confidence: f64,
+}
+
+impl CompareOptions {
+    /// # Errors
+    /// [`Error::Invalid`] for a tolerance that is not a number of at least 0.
+    pub fn check(&self) -> Result<()> {
+        let tolerances = [
+            ("depth", self.depth),
+            ("position", self.position),
+            ("normal", self.normal_deg),
+            ("confidence", self.confidence),
+        ];
+        match tolerances.iter().find(|(_, v)| !(v.is_finite() && *v >= 0.0)) {
+            Some((name, v)) => {
+                Err(Error::invalid(format!("{name} tolerance {v}: it must be a number of at least 0")))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// How much one quantity differs over the elements that have it in both.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Differences {
+    /// Elements compared.
+    pub compared: usize,
+    /// Elements without any difference.
+    pub equal: usize,
+    /// Half of the elements differ by at most this.
+    pub p50: f64,
+    /// 90 % of the elements differ by at most this.
+    pub p90: f64,
+    /// 99 % of the elements differ by at most this.
+    pub p99: f64,
+    /// 99.9 % of the elements differ by at most this.
+    pub p999: f64,
+    /// 99.99 % of the elements differ by at most this.
+    pub p9999: f64,
+    /// The largest difference; infinite (`null` in JSON) where only one value is a number.
+    pub max: f64,
+}
+
+impl Differences {
+    /// The percentiles (nearest rank) of `values`; `None` of none.
+    fn of(mut values: Vec<f64>) -> Option<Self> {
+        values.sort_unstable_by(f64::total_cmp);
+        let max = *values.last()?;
+        // in units of 0.01 %, to find the rank without rounding
+        let at = |share: usize| values[(share * values.len()).div_ceil(10_000) - 1];
+        Some(Differences {
+            compared: values.len(),
+            equal: values.partition_point(|v| *v <= 0.0),
+            p50: at(5000),
+            p90: at(9000),
+            p99: at(9900),
+            p999: at(9990),
+            p9999: at(9999),
+            max,
+        })
+    }
+}
+
+/// How often a quantity is the same, where differences have no size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Agreement {
+    /// Elements compared.
+    pub compared: usize,
+    /// Elements that are the same.
+    pub equal: usize,
+}
+
+impl Agreement {
+    fn count(&mut self, equal: bool) {
+        self.compared += 1;
+        self.equal += usize::from(equal);
+    }
+}
+
+/// The first element, in file order, that differs by more than the tolerances.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FirstDifference {
+    /// Position of the element: point number, or pixel number row by row.
+    pub index: usize,
+    /// What differs: "position", "depth", "views", ...
+    pub attribute: &'static str,
+    /// Its value in the first result.
+    pub a: String,
+    /// Its value in the second result.
+    pub b: String,
+}
+
+impl FirstDifference {
+    fn new(
+        index: usize,
+        attribute: &'static str,
+        a: &impl std::fmt::Debug,
+        b: &impl std::fmt::Debug,
+    ) -> Self {
+        FirstDifference { index, attribute, a: format!("{a:?}"), b: format!("{b:?}") }
+    }
+}
+
+/// `|a − b|` over the larger magnitude; 0 for equal values, infinite where only one is a number.
+fn relative(a: f32, b: f32) -> f64 {
+    let (a, b) = (f64::from(a), f64::from(b));
+    if a == b || a.is_nan() && b.is_nan() {
+        return 0.0;
+    }
+    let difference = (a - b).abs() / a.abs().max(b.abs());
+    if difference.is_nan() { f64::INFINITY } else { difference }
+}
+
+/// Euclidean distance; 0 for equal values, infinite where only one is a point.
+fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    if a.map(f32::to_bits) == b.map(f32::to_bits) {
+        return 0.0;
+    }
+    let squared: f64 = a.iter().zip(b).map(|(a, b)| (f64::from(*a) - f64::from(b)).powi(2)).sum();
+    if squared.is_nan() { f64::INFINITY } else { squared.sqrt() }
+}
+
+/// Angle between two directions, degrees; 0 for equal values, 180 where only one is a direction.
+fn angle_deg(a: [f32; 3], b: [f32; 3]) -> f64 {
+    if a == b {
+        return 0.0;
+    }
+    let [a, b] = [a, b].map(|v| nalgebra::Vector3::from(v.map(f64::from)));
+    let angle = a.cross(&b).norm().atan2(a.dot(&b)).to_degrees();
+    if angle.is_nan() || a.norm() == 0.0 || b.norm() == 0.0 { 180.0 } else { angle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_values_of_the_nearest_rank() {
+        let d = Differences::of((1..=20_000).rev().map(f64::from).collect()).unwrap();
+        assert_eq!(
+            (d.p50, d.p90, d.p99, d.p999, d.p9999),
+            (10_000.0, 18_000.0, 19_800.0, 19_980.0, 19_998.0)
+        );
+        assert_eq!((d.compared, d.equal, d.max), (20_000, 0, 20_000.0));
+        let few = Differences::of(vec![0.0, 0.0, f64::INFINITY]).unwrap();
+        assert_eq!((few.equal, few.p50, few.p90, few.max), (2, 0.0, f64::INFINITY, f64::INFINITY));
+        assert_eq!(Differences::of(Vec::new()), None);
+    }
+
+    #[test]
+    fn values_that_are_no_numbers_are_the_same_or_infinitely_apart() {
+        assert_eq!((relative(f32::NAN, f32::NAN), relative(1.0, f32::NAN)), (0.0, f64::INFINITY));
+        assert_eq!((relative(0.0, 0.0), relative(0.0, 2.0), relative(1.0, 0.5)), (0.0, 1.0, 0.5));
+        let (p, nan) = ([1.0, 2.0, 3.0], [f32::NAN; 3]);
+        assert_eq!(
+            (distance(nan, nan), distance(p, nan), distance(p, [1.0, 2.0, 5.0])),
+            (0.0, f64::INFINITY, 2.0)
+        );
+        let (x, y) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        assert_eq!((angle_deg(x, x), angle_deg(x, y), angle_deg(x, [0.0; 3])), (0.0, 90.0, 180.0));
+        assert!(
+            (angle_deg(x, [1.0, 1e-5, 0.0]) - 1e-5f64.to_degrees()).abs() < 1e-9,
+            "small angles are exact"
+        );
+    }
+
+    #[test]
+    fn tolerances_are_checked() {
+        assert!(CompareOptions::default().check().is_ok());
+        let bad = CompareOptions { position: f64::NAN, ..Default::default() };
+        assert!(bad.check().unwrap_err().to_string().contains("position"));
+    }
+}
