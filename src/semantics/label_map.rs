@@ -1,6 +1,35 @@
-//! What of a label map is certain.
+//! Label maps at other sizes, and what of them is certain.
 
-use crate::scene::LabelMap;
+use crate::geometry::Size;
+use crate::scene::{Grid, LabelMap};
+
+/// The labels at another size: each pixel takes the label of the source pixel whose centre is nearest to its own,
+/// between two the one to the left or above. A label is never interpolated.
+///
+/// An empty map is void at any size.
+pub fn nearest_labels(labels: &LabelMap, size: Size) -> LabelMap {
+    if labels.size() == size {
+        return labels.clone();
+    }
+    let mut out = Grid::filled(size, 0);
+    if labels.size().area() == 0 || size.area() == 0 {
+        return out;
+    }
+    let columns = nearest_indices(labels.width(), size.width as usize);
+    let rows = nearest_indices(labels.height(), size.height as usize);
+    for (target, &y) in out.data_mut().chunks_exact_mut(columns.len()).zip(&rows) {
+        let source = labels.row(y);
+        for (label, &x) in target.iter_mut().zip(&columns) {
+            *label = source[x];
+        }
+    }
+    out
+}
+
+/// Source index of each of `to` targets: the centre of target `i` lies at `(i + 1/2) from / to - 1/2`.
+fn nearest_indices(from: usize, to: usize) -> Vec<usize> {
+    (0..to).map(|i| ((2 * i + 1) * from).div_ceil(2 * to) - 1).collect()
+}
 
 /// The labels with every pixel within `width` pixels of a pixel of another id set to void.
 ///
@@ -45,12 +74,34 @@ fn over_line(out: &mut [u16], source: &[u16], radius: usize, stride: usize, pick
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Size;
-    use crate::scene::Grid;
 
     fn map(rows: &[&[u16]]) -> LabelMap {
         let size = Size::new(rows[0].len() as u32, rows.len() as u32);
         Grid::from_vec(size, rows.concat()).unwrap()
+    }
+
+    #[test]
+    fn the_nearest_centre_is_taken_up_and_down() {
+        let labels = map(&[&[1, 2, 3, 4, 5, 6, 7, 8]]);
+        let at = |width| nearest_labels(&labels, Size::new(width, 1)).into_vec();
+        assert_eq!(at(4), [1, 3, 5, 7]);
+        assert_eq!(at(2), [2, 6]);
+        assert_eq!(at(1), [4]);
+        assert_eq!(at(3), [2, 4, 7]);
+        assert_eq!(at(16), [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8]);
+        let rows = map(&[&[1], &[2], &[3]]);
+        assert_eq!(nearest_labels(&rows, Size::new(1, 1)).data(), [2]);
+        assert_eq!(nearest_labels(&rows, Size::new(1, 3)), rows);
+        assert_eq!(nearest_labels(&Grid::default(), Size::new(2, 1)).data(), [0, 0]);
+    }
+
+    #[test]
+    fn resampling_invents_no_label() {
+        let labels = map(&[&[0, 300, 7], &[9, 0, 300]]);
+        for size in [Size::new(11, 13), Size::new(2, 1), Size::new(1, 40)] {
+            let out = nearest_labels(&labels, size);
+            assert!(out.data().iter().all(|l| [0, 300, 7, 9].contains(l)));
+        }
     }
 
     #[test]

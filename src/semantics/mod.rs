@@ -11,6 +11,6 @@ mod policy;
 mod vote;
 
 pub use classes::{Class, ClassId, ClassTable};
-pub use label_map::void_borders;
+pub use label_map::{nearest_labels, void_borders};
 pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency};
 pub use vote::{LabelVote, Vote};

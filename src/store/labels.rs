@@ -5,8 +5,8 @@ use super::label_png::{LabelReader, UnknownLabel};
 use crate::error::{Error, Result};
 use crate::geometry::Size;
 use crate::progress::{Progress, Stage};
-use crate::scene::{Grid, LabelMap, ViewIndex, resize_nearest};
-use crate::semantics::{ClassId, ClassTable};
+use crate::scene::{Grid, LabelMap, ViewIndex};
+use crate::semantics::{ClassId, ClassTable, nearest_labels};
 use rayon::prelude::*;
 use semvs_formats::Limits;
 use std::collections::{BTreeMap, HashMap};
@@ -134,7 +134,7 @@ impl LabelStore {
             return Ok(Arc::new(Grid::filled(size, ClassId::VOID.0)));
         };
         self.cache.get_or_load((view, size), || {
-            let labels = resize_nearest(&self.reader.read(path, |_| Ok(()))?, size);
+            let labels = nearest_labels(&self.reader.read(path, |_| Ok(()))?, size);
             let bytes = std::mem::size_of_val(labels.data());
             Ok((labels, bytes))
         })
