@@ -71,6 +71,7 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
                     candidates: options.candidates as usize,
                     random: if at_start { 32 } else { 0 },
                     random_if_bad: if halvings == coarsest { 8 } else { 4 },
+                    views: options.refine_views as usize,
                     fresh: i == 0,
                 },
             );
@@ -132,6 +133,7 @@ pub fn refine_geometric(
             candidates: options.candidates as usize,
             random: 0,
             random_if_bad: 0,
+            views: options.refine_views as usize,
             fresh: false,
         },
     );

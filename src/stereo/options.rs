@@ -13,6 +13,8 @@ pub struct StereoOptions {
     pub geometric_iterations: u32,
     /// Hypotheses of each kind that a tile tries at a visit. 1..=64. Default: 6.
     pub candidates: u32,
+    /// Source views, the best of each tile, that small changes of a plane are compared with. 1..=64. Default: 3.
+    pub refine_views: u32,
     /// A pixel whose final cost is not below this has no depth. (0, 2]. Default: 0.9.
     pub keep_cost: f32,
     /// Weight of the geometric term: cost added per pixel of disagreement, at most four. >= 0. Default: 0.1.
@@ -28,6 +30,7 @@ impl Default for StereoOptions {
             iterations: 3,
             geometric_iterations: 2,
             candidates: 6,
+            refine_views: 3,
             keep_cost: 0.9,
             geometric_weight: 0.1,
             seed: 0,
@@ -46,6 +49,7 @@ impl StereoOptions {
             ("iterations", self.iterations, 1, 100),
             ("geometric iterations", self.geometric_iterations, 0, 100),
             ("candidates", self.candidates, 1, 64),
+            ("refine views", self.refine_views, 1, 64),
         ];
         for (name, value, low, high) in whole {
             if !(low..=high).contains(&value) {

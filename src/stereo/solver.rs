@@ -30,6 +30,8 @@ pub(crate) struct Pass {
     pub(crate) random: usize,
     /// Random planes tried on tiles that match badly.
     pub(crate) random_if_bad: usize,
+    /// Source views that shaken and fitted planes are compared with.
+    pub(crate) views: usize,
     /// Whether the visit starts from planes of a coarser level whose costs mean little.
     pub(crate) fresh: bool,
 }
@@ -46,7 +48,14 @@ pub(crate) struct Solver<'a> {
 
 impl<'a> Solver<'a> {
     pub(crate) fn new(kernels: Kernels, level: &'a Level, seed: u64, view: u32) -> Self {
-        Solver { kernels, level, seed, view, tile: Tile::boxed(), tried: Vec::with_capacity(64) }
+        Solver {
+            kernels,
+            level,
+            seed,
+            view,
+            tile: Tile::boxed(level.sources.len()),
+            tried: Vec::with_capacity(64),
+        }
     }
 
     /// Matching cost of every pixel's current plane.
@@ -80,6 +89,7 @@ impl<'a> Solver<'a> {
         (self.kernels.prepare)(&mut self.tile, self.level);
         (self.kernels.begin)(&mut self.tile, self.level);
         self.tried.clear();
+        self.tile.use_all_views();
         let first = rng.below(CELLS);
         let own = if pass.fresh { CELLS } else { pass.candidates.min(CELLS) };
         for k in 0..own {
@@ -87,6 +97,9 @@ impl<'a> Solver<'a> {
                 && cost < 1.5
             {
                 self.offer(self.tile.plane_at(x, y));
+            }
+            if k == 0 {
+                self.tile.rank_views();
             }
         }
         for k in 0..pass.candidates {
@@ -100,6 +113,7 @@ impl<'a> Solver<'a> {
             let p = candidates::random(self.level, rng);
             (self.kernels.try_plane)(&mut self.tile, self.level, p);
         }
+        self.tile.use_best_views(pass.views);
         for k in 0..pass.candidates {
             self.shake(pass, first, k, rng);
         }

@@ -101,6 +101,17 @@ pub(crate) struct Scratch {
     pub(crate) smooth: HaloMap,
 }
 
+/// A source view as seen from the tile.
+#[derive(Clone, Copy)]
+pub(crate) struct TileView {
+    /// Whether candidates are compared with it.
+    pub(crate) on: bool,
+    /// Mean cost of the last candidate compared with it.
+    pub(crate) cost: f32,
+    /// 0 for the view that suits the tile best.
+    pub(crate) rank: usize,
+}
+
 /// The working set of one tile.
 pub(crate) struct Tile {
     /// Column of the first pixel; may be negative.
@@ -111,6 +122,8 @@ pub(crate) struct Tile {
     pub(crate) belief: Belief,
     pub(crate) halo: Halo,
     pub(crate) scratch: Scratch,
+    /// One entry per source of the level.
+    pub(crate) views: Vec<TileView>,
 }
 
 const ZERO_TILE: TileMap = [[0.0; TILE_W]; TILE_H];
@@ -119,7 +132,7 @@ const ZERO_WIN: [WinRow; WIN_H] = [[0.0; WIN_W]; WIN_H];
 
 impl Tile {
     /// A tile of zeros on the heap.
-    pub(crate) fn boxed() -> Box<Tile> {
+    pub(crate) fn boxed(sources: usize) -> Box<Tile> {
         Box::new(Tile {
             x0: 0,
             y0: 0,
@@ -148,7 +161,28 @@ impl Tile {
                 second: ZERO_TILE,
                 smooth: ZERO_HALO,
             },
+            views: vec![TileView { on: true, cost: UNSEEN, rank: 0 }; sources],
         })
+    }
+
+    /// From now on compares candidates with all views.
+    pub(crate) fn use_all_views(&mut self) {
+        self.views.iter_mut().for_each(|v| v.on = true);
+    }
+
+    /// Ranks the views by how well the last candidate suited them.
+    pub(crate) fn rank_views(&mut self) {
+        let mut order: Vec<usize> = (0..self.views.len()).collect();
+        order.sort_by(|&a, &b| self.views[a].cost.total_cmp(&self.views[b].cost));
+        for (rank, i) in order.into_iter().enumerate() {
+            self.views[i].rank = rank;
+        }
+    }
+
+    /// From now on compares candidates with the `n` views ranked first. A plane's cost is the mean of its two best
+    /// views, so that a subset never makes a candidate look better than it is.
+    pub(crate) fn use_best_views(&mut self, n: usize) {
+        self.views.iter_mut().for_each(|v| v.on = v.rank < n);
     }
 
     /// The plane of pixel `(x, y)` of the tile, anchored at the tile's centre.

@@ -70,7 +70,7 @@ fn kernels_agree_with_the_definition() {
     let plane = InversePlane { w: 0.26, wx: 0.0009, wy: -0.0006 };
     for cpu in [CpuLevel::Scalar, CpuLevel::Avx2, CpuLevel::Avx512].into_iter().filter(|c| c.is_supported()) {
         let kernels = Kernels::of(cpu);
-        let mut tile = Tile::boxed();
+        let mut tile = Tile::boxed(level.sources.len());
         tile.load(&level, &state, at.0, at.1);
         tile.belief.total = [[9.0; TILE_W]; TILE_H];
         (kernels.prepare)(&mut tile, &level);

@@ -47,16 +47,18 @@ pub(in crate::stereo::cost) fn try_plane(tile: &mut Tile, level: &Level, plane: 
 /// Matching cost of a plane over all sources, as the best and second best per pixel. False if no source sees it.
 #[inline(always)]
 fn data_cost(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
-    let Tile { x0, y0, patch, scratch, .. } = tile;
+    let Tile { x0, y0, patch, scratch, views, .. } = tile;
     scratch.best = [[UNSEEN; TILE_W]; TILE_H];
     scratch.second = [[UNSEEN; TILE_W]; TILE_H];
     let mut any = false;
-    for source in &level.sources {
+    for (source, view) in level.sources.iter().zip(views.iter_mut()).filter(|(_, view)| view.on) {
+        view.cost = UNSEEN;
         let coverage = warp(source, *x0, *y0, plane, scratch);
         if coverage == Coverage::None {
             continue;
         }
         any = true;
+        let mut sum = ZERO;
         for y in 0..TILE_H {
             let mut cost = zncc_row(patch, &scratch.warped, y);
             if coverage == Coverage::Part {
@@ -80,7 +82,11 @@ fn data_cost(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
                 geometric_row(g, *x0 as f32, yy, &w, level.geometric_weight, &mut cost);
             }
             two_best(&mut scratch.best[y], &mut scratch.second[y], &cost);
+            for x in 0..TILE_W {
+                sum[x] += cost[x];
+            }
         }
+        view.cost = sum.iter().sum::<f32>() / (TILE_W * TILE_H) as f32;
     }
     any
 }
