@@ -79,6 +79,24 @@ fn view_selection_equals_openmvs_on_larger_scenes() {
 }
 
 #[test]
+fn densified_scenes_equal_openmvs_to_the_byte() {
+    use semvs::store::export::{interface_archive, write_interface};
+    let scratch = tempfile::tempdir().unwrap();
+    for name in ["facade16", "fountain_p11"] {
+        let scene = extra(&format!("datasets/{name}/scene.mvs"));
+        let Some((scene, reference)) = scene.zip(extra(&format!("reference/{name}/scene_dense.mvs"))) else {
+            return;
+        };
+        let mut loaded = load(&scene);
+        loaded.search.working_folder = scene.parent().unwrap().to_owned();
+        let (cameras, neighbors) = select(&loaded, &resolution(1, 320));
+        let path = scratch.path().join(name);
+        write_interface(&path, &interface_archive(&loaded, &cameras, &neighbors)).unwrap();
+        assert!(std::fs::read(path).unwrap() == std::fs::read(reference).unwrap(), "{name}: bytes differ");
+    }
+}
+
+#[test]
 fn a_densified_scene_keeps_its_neighbours_and_gets_its_tracks() {
     let folder = root().join("compat-fixtures/facade6");
     let (_, fresh) = select(&load(&folder.join("scene.mvs")), &resolution(1, 160));

@@ -26,7 +26,6 @@ pub fn interface_archive(
         obb: loaded.scene.roi.as_ref().map(export_roi),
         ..mvs::Scene::default()
     };
-    sort_views(&mut archive.points.views);
     for (i, image) in archive.images.iter_mut().enumerate() {
         export_image(image, &loaded.scene, i, &loaded.search);
         if let Some(neighbors) = neighbors.get(i) {
@@ -114,32 +113,6 @@ fn export_neighbor(neighbor: &Neighbor) -> mvs::ViewScore {
         angle: neighbor.angle,
         area: neighbor.area,
         score: neighbor.score,
-    }
-}
-
-/// Sorts the views of every point with their confidences; confidences that are all 0 are dropped.
-fn sort_views(views: &mut mvs::Visibility) {
-    if views.weights.iter().all(|&w| w == 0.0) {
-        views.weights.clear();
-    }
-    let mut pairs = Vec::new();
-    for point in 0..views.len() {
-        let range = views.range(point);
-        let images = &mut views.images[range.clone()];
-        if images.is_sorted() {
-            continue;
-        }
-        if views.weights.is_empty() {
-            images.sort_unstable();
-            continue;
-        }
-        let weights = &mut views.weights[range];
-        pairs.clear();
-        pairs.extend(images.iter().copied().zip(weights.iter().copied()));
-        pairs.sort_by_key(|&(image, _)| image);
-        for (i, &(image, weight)) in pairs.iter().enumerate() {
-            (images[i], weights[i]) = (image, weight);
-        }
     }
 }
 

@@ -8,7 +8,6 @@ use crate::scene::{Calibration, ImageId, Neighbor, Scene, Tracks, View, ViewInde
 use nalgebra::{Matrix3, Vector3};
 use semvs_formats::Limits;
 use semvs_formats::mvs::{self, NO_ID, SceneFile};
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use tracing::warn;
 
@@ -17,7 +16,7 @@ use tracing::warn;
 pub struct LoadedScene {
     /// What the stages work on.
     pub scene: Scene,
-    /// What the file held; exports start from it. Its images are those of [`Scene::views`], in the same order.
+    /// What the file held, repaired; exports start from it. Its images are those of [`Scene::views`], in the same order.
     pub archive: mvs::Scene,
     /// Which archive the file is.
     pub container: mvs::Container,
@@ -38,14 +37,19 @@ impl LoadedScene {
 /// failing that, to the folder of the file.
 ///
 /// What can be left out without harm is, with a warning: sparse points at no finite place, views of points that name
-/// no calibrated image, neighbour scores that are no numbers. Duplicate global IDs are renumbered.
+/// no calibrated image, neighbour scores that lead nowhere. Where images share a global ID, all get
+/// their position as ID.
 ///
 /// # Errors
 /// [`Error`] if the file cannot be read, a calibrated image has impossible camera data, or fewer than two images
 /// are calibrated.
 pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result<LoadedScene> {
     let file = SceneFile::read(path, limits).map_err(|e| Error::format(path, e))?;
-    let (archive, container) = (file.scene, file.container);
+    let (mut archive, container) = (file.scene, file.container);
+    // Before repair merges them: a view that observed a point twice counts twice in view selection.
+    let tracks = import_tracks(&archive);
+    let repairs = archive.repair().map_err(|e| Error::format(path, e))?;
+    warn_of_repairs(path, &repairs);
     archive.check().map_err(|e| Error::format(path, e))?;
     let search = SearchPath::new(working_folder, path);
     let views = import_views(path, &archive, container, &search)?;
@@ -57,7 +61,6 @@ pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result
         );
         return Err(Error::content(path, what));
     }
-    let tracks = import_tracks(path, &archive, &views);
     let roi = archive.obb.as_ref().map(import_roi);
     let scene = Scene { views, tracks, roi };
     Ok(LoadedScene { scene, archive, container, path: path.to_owned(), search })
@@ -70,7 +73,6 @@ fn import_views(
     container: mvs::Container,
     search: &SearchPath,
 ) -> Result<Vec<View>> {
-    let ids = unique_ids(path, &archive.images);
     let mut views = Vec::with_capacity(archive.images.len());
     for (i, image) in archive.images.iter().enumerate() {
         let name = clean_name(&String::from_utf8_lossy(&image.name));
@@ -93,7 +95,7 @@ fn import_views(
         };
         let neighbors = import_neighbors(archive, i);
         let avg_depth = if image.avg_depth.is_finite() { image.avg_depth.max(0.0) } else { 0.0 };
-        views.push(View { name, mask, id: ImageId(ids[i]), calibration, neighbors, avg_depth });
+        views.push(View { name, mask, id: ImageId(image.id_at(i)), calibration, neighbors, avg_depth });
     }
     Ok(views)
 }
@@ -135,35 +137,23 @@ fn size_from_file(calibration: &mut Calibration, container: mvs::Container, imag
     }
 }
 
-/// Global IDs, the local index where there is none; later ones of equal IDs get the next free number.
-fn unique_ids(path: &Path, images: &[mvs::Image]) -> Vec<u32> {
-    let stated = |(i, image): (usize, &mvs::Image)| if image.id == NO_ID { i as u32 } else { image.id };
-    let mut ids: Vec<u32> = images.iter().enumerate().map(stated).collect();
-    let mut taken: HashSet<u32> = ids.iter().copied().collect();
-    let mut seen = HashSet::with_capacity(ids.len());
-    let mut next = 0;
-    for (i, id) in ids.iter_mut().enumerate() {
-        if seen.insert(*id) {
-            continue;
-        }
-        while taken.contains(&next) {
-            next += 1;
-        }
-        warn!("{}: image {i} has the ID {id} of another image; it becomes {next}", path.display());
-        taken.insert(next);
-        *id = next;
+/// One line for each kind of flaw that was set right.
+fn warn_of_repairs(path: &Path, repairs: &mvs::Repairs) {
+    let kinds = [
+        (repairs.dropped_points, "sparse points at no finite place are left out"),
+        (repairs.dropped_views, "views of sparse points name no calibrated image and are left out"),
+        (repairs.zeroed_weights, "confidences of sparse points are no numbers >= 0 and count as unknown"),
+        (repairs.dropped_view_scores, "neighbour entries lead nowhere and are left out"),
+        (repairs.shared_ids, "images share the global ID of another one; all get their position as ID"),
+    ];
+    for (count, what) in kinds.iter().filter(|(count, _)| *count > 0) {
+        warn!("{}: {count} {what}", path.display());
     }
-    ids
 }
 
-/// The stored neighbours of image `index`, as they are but for those that cannot be used.
+/// The stored neighbours of image `index` that are calibrated.
 fn import_neighbors(archive: &mvs::Scene, index: usize) -> Vec<Neighbor> {
-    let usable = |s: &&mvs::ViewScore| {
-        let calibrated = archive.images.get(s.image as usize).is_some_and(|other| other.pose != NO_ID);
-        calibrated
-            && s.image as usize != index
-            && [s.scale, s.angle, s.area, s.score].iter().all(|v| v.is_finite())
-    };
+    let calibrated = |s: &&mvs::ViewScore| archive.images[s.image as usize].pose != NO_ID;
     let neighbor = |s: &mvs::ViewScore| Neighbor {
         view: ViewIndex(s.image),
         points: s.points,
@@ -172,33 +162,18 @@ fn import_neighbors(archive: &mvs::Scene, index: usize) -> Vec<Neighbor> {
         area: s.area,
         score: s.score,
     };
-    archive.images[index].view_scores.iter().filter(usable).map(neighbor).collect()
+    archive.images[index].view_scores.iter().filter(calibrated).map(neighbor).collect()
 }
 
 /// The sparse points with the calibrated views that see them.
-fn import_tracks(path: &Path, archive: &mvs::Scene, views: &[View]) -> Tracks {
+fn import_tracks(archive: &mvs::Scene) -> Tracks {
+    let calibrated = |&v: &u32| archive.images.get(v as usize).is_some_and(|image| image.pose != NO_ID);
     let mut tracks = Tracks::default();
-    let (mut bad_points, mut bad_views) = (0usize, 0usize);
     for (i, point) in archive.points.positions.iter().enumerate() {
-        if !point.iter().all(|c| c.is_finite()) {
-            bad_points += 1;
-            continue;
+        if point.iter().all(|c| c.is_finite()) {
+            let views = archive.points.views.images_of(i).iter().copied().filter(calibrated);
+            tracks.push(*point, views.map(ViewIndex));
         }
-        let seen_by = archive.points.views.images_of(i).iter().filter_map(|&v| {
-            let calibrated = views.get(v as usize).is_some_and(|view| view.calibration.is_some());
-            bad_views += usize::from(!calibrated);
-            calibrated.then_some(ViewIndex(v))
-        });
-        tracks.push(*point, seen_by);
-    }
-    if bad_points > 0 {
-        warn!("{}: {bad_points} sparse points at no finite place are left out", path.display());
-    }
-    if bad_views > 0 {
-        warn!(
-            "{}: {bad_views} views of sparse points name no calibrated image and are left out",
-            path.display()
-        );
     }
     tracks
 }

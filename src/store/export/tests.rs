@@ -63,17 +63,3 @@ fn names_are_made_relative_to_the_working_folder() {
     assert_eq!(name(""), "");
     assert_eq!(export_name(b"\xff\xfe.jpg", &search), b"\xff\xfe.jpg");
 }
-
-#[test]
-fn views_are_sorted_with_their_confidences() {
-    let mut views = mvs::Visibility::default();
-    views.push(&[2, 0, 1], &[0.2, 0.5, 0.1]);
-    views.push(&[0, 3], &[0.0, 0.4]);
-    sort_views(&mut views);
-    assert_eq!((views.images_of(0), views.weights_of(0)), (&[0, 1, 2][..], &[0.5, 0.1, 0.2][..]));
-    assert_eq!((views.images_of(1), views.weights_of(1)), (&[0, 3][..], &[0.0, 0.4][..]));
-    let mut views = mvs::Visibility::default();
-    views.push(&[1, 0], &[0.0, 0.0]);
-    sort_views(&mut views);
-    assert_eq!((views.images_of(0), views.weights_of(0)), (&[0, 1][..], &[][..]));
-}

@@ -103,8 +103,7 @@ fn names_and_ids_are_put_right() {
     let views = &loaded.scene.views;
     assert_eq!(views[1].name, "images/1.jpg");
     assert_eq!((views[0].mask.as_deref(), views[1].mask.as_deref()), (None, Some("masks/1.png")));
-    // IDs 2 (stated), 1 and 2 (local indices): the later 2 becomes the first free number.
-    assert_eq!(views.iter().map(|v| v.id.0).collect::<Vec<_>>(), [2, 1, 0]);
+    assert_eq!(views.iter().map(|v| v.id.0).collect::<Vec<_>>(), [0, 1, 2], "IDs 2, 1 and 2 are not unique");
 }
 
 #[test]
@@ -112,6 +111,19 @@ fn points_nowhere_are_left_out() {
     let mut archive = archive();
     archive.points.positions[2] = [0.0, f32::INFINITY, 1.0];
     assert_eq!(load(&archive, 7).unwrap().scene.tracks.len(), 3);
+}
+
+#[test]
+fn views_that_name_no_image_are_left_out_and_repeated_ones_count() {
+    let mut archive = archive();
+    archive.points.views = mvs::Visibility::default();
+    for views in [&[0, 1, 7][..], &[2, 0, 2], &[1, 2], &[]] {
+        archive.points.views.push(views, &[]);
+    }
+    let loaded = load(&archive, 7).unwrap();
+    let visibility = |i| loaded.scene.tracks.visibility(i).iter().map(|v| v.0).collect::<Vec<_>>();
+    assert_eq!([visibility(0), visibility(1)], [vec![0, 1], vec![0, 2, 2]]);
+    assert_eq!(loaded.archive.points.views.images_of(1), [0, 2], "what is written has every view once");
 }
 
 #[test]
