@@ -13,6 +13,7 @@ mod resolution;
 mod roi_estimate;
 #[cfg(test)]
 pub(crate) mod synthetic;
+mod tower;
 
 pub use cloud::{CloudLayout, CloudPoint, PointCloud, PointSink, PointSource};
 pub use depth_range::{DEFAULT_DEPTH_RANGE, SparseInit, SparsePoint};
@@ -25,3 +26,4 @@ pub(crate) use resample::area_rgb;
 pub use resample::{area_color, gray_from_color, resize_gray, resize_nearest};
 pub use resolution::{ResolutionOptions, scaled_size};
 pub use roi_estimate::{RoiEstimation, estimate_roi};
+pub use tower::looks_like_tower;
