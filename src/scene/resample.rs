@@ -81,8 +81,10 @@ trait Channel: Copy + Default + Send + Sync {
     fn from_f32(value: f32) -> Self;
     /// Mean of a block of 2×2.
     fn mean_of_four(a: Self, b: Self, c: Self, d: Self) -> Self;
-    /// Sum of the values, exact for integers; for real numbers in groups of four.
-    fn sum(values: impl Iterator<Item = Self>) -> f32;
+    /// Sum of each channel over the rows of a block, exact for integers; for real numbers in groups of four.
+    fn block_sum<'a, const CN: usize>(rows: impl Iterator<Item = &'a [Self]>) -> [f32; CN]
+    where
+        Self: 'a;
 }
 
 impl Channel for u8 {
@@ -101,8 +103,21 @@ impl Channel for u8 {
         ((u16::from(a) + u16::from(b) + u16::from(c) + u16::from(d) + 2) >> 2) as u8
     }
     #[inline]
-    fn sum(values: impl Iterator<Item = u8>) -> f32 {
-        values.map(u64::from).sum::<u64>() as f32
+    fn block_sum<'a, const CN: usize>(rows: impl Iterator<Item = &'a [u8]>) -> [f32; CN] {
+        let mut sums = [0u64; CN];
+        for row in rows {
+            // The sum of a row of 65,535 pixels fits 32 bits.
+            let mut row_sums = [0u32; CN];
+            for pixel in row.chunks_exact(CN) {
+                for c in 0..CN {
+                    row_sums[c] += u32::from(pixel[c]);
+                }
+            }
+            for c in 0..CN {
+                sums[c] += u64::from(row_sums[c]);
+            }
+        }
+        sums.map(|sum| sum as f32)
     }
 }
 
@@ -120,15 +135,27 @@ impl Channel for f32 {
         ((a + b) + (c + d)) * 0.25
     }
     #[inline]
-    fn sum(mut values: impl Iterator<Item = f32>) -> f32 {
-        let mut sum = 0.0;
-        while let Some(a) = values.next() {
-            match (values.next(), values.next(), values.next()) {
-                (Some(b), Some(c), Some(d)) => sum += a + b + c + d,
-                (b, c, _) => sum = sum + a + b.unwrap_or(0.0) + c.unwrap_or(0.0),
+    fn block_sum<'a, const CN: usize>(rows: impl Iterator<Item = &'a [f32]>) -> [f32; CN] {
+        // Groups of four run on from row to row.
+        let (mut sums, mut group, mut filled) = ([0.0; CN], [[0.0; CN]; 4], 0);
+        for row in rows {
+            for pixel in row.chunks_exact(CN) {
+                group[filled].copy_from_slice(pixel);
+                filled += 1;
+                if filled == 4 {
+                    for c in 0..CN {
+                        sums[c] += group[0][c] + group[1][c] + group[2][c] + group[3][c];
+                    }
+                    filled = 0;
+                }
             }
         }
-        sum
+        for pixel in &group[..filled] {
+            for c in 0..CN {
+                sums[c] += pixel[c];
+            }
+        }
+        sums
     }
 }
 
@@ -154,9 +181,8 @@ fn area_of_blocks<T: Channel, const CN: usize>(src: &[T], from: Size, dst: &mut 
     dst.par_chunks_mut(to.width as usize * CN).enumerate().for_each(|(y, out)| {
         let top = y * side;
         let rows = side.min(height - top);
-        let block = |x: usize, columns: usize, c: usize| {
-            let row = move |r: usize| &src[((top + r) * width + x * side) * CN..][..columns * CN];
-            T::sum((0..rows).flat_map(move |r| row(r).iter().skip(c).step_by(CN).copied()))
+        let block = |x: usize, columns: usize| {
+            T::block_sum::<CN>((0..rows).map(|r| &src[((top + r) * width + x * side) * CN..][..columns * CN]))
         };
         let mut x = 0;
         if rows == side {
@@ -167,16 +193,20 @@ fn area_of_blocks<T: Channel, const CN: usize>(src: &[T], from: Size, dst: &mut 
                     &mut out[..whole_columns * CN],
                 );
             } else {
-                for (i, value) in out[..whole_columns * CN].iter_mut().enumerate() {
-                    *value = T::from_f32(block(i / CN, side, i % CN) * share);
+                for (x, pixel) in out[..whole_columns * CN].chunks_exact_mut(CN).enumerate() {
+                    let sums = block(x, side);
+                    for c in 0..CN {
+                        pixel[c] = T::from_f32(sums[c] * share);
+                    }
                 }
             }
             x = whole_columns;
         }
         for x in x..to.width as usize {
             let columns = side.min(width - x * side);
+            let sums = block(x, columns);
             for c in 0..CN {
-                out[x * CN + c] = T::from_f32(block(x, columns, c) / (rows * columns) as f32);
+                out[x * CN + c] = T::from_f32(sums[c] / (rows * columns) as f32);
             }
         }
     });
