@@ -8,6 +8,7 @@ mod error;
 pub mod evaluate;
 pub mod fusion;
 pub mod geometry;
+pub mod pipeline;
 pub mod progress;
 pub mod report;
 pub mod scene;

@@ -1,7 +1,8 @@
 //! Finding and reading the label maps of a scene's views.
 
 use super::byte_cache::ByteCache;
-use super::label_png::{LabelReader, UnknownLabel};
+use super::label_png::LabelReader;
+pub use super::label_png::UnknownLabel;
 use crate::error::{Error, Result};
 use crate::geometry::Size;
 use crate::progress::{Progress, Stage};

@@ -1,0 +1,63 @@
+//! Small jobs on a scene without depth maps: its region of interest and neighbour lists as text.
+
+use super::job::SceneJob;
+use super::prepare::load;
+use crate::error::{Error, Result};
+use crate::progress::{Event, Progress};
+use crate::store::atomic::AtomicFile;
+use crate::store::export::{interface_archive, write_interface};
+use crate::store::import::LoadedScene;
+use semvs_formats::{Limits, neighbors_file, roi};
+use std::path::Path;
+use std::time::Instant;
+
+/// Writes the scene with the region of interest in the text file `region` to `path`.
+///
+/// # Errors
+/// Unreadable files, a place that cannot be written.
+pub fn import_roi(job: &SceneJob, region: &Path, path: &Path, progress: &Progress) -> Result<()> {
+    let loaded = load(job, progress)?;
+    let start = Instant::now();
+    let obb = roi::read(region, &Limits::default()).map_err(|e| Error::format(region, e))?;
+    let mut archive = interface_archive(&loaded, &no_cameras(&loaded), &[]);
+    archive.obb = Some(obb);
+    write_interface(path, &archive)?;
+    progress.event(Event::SceneSaved { path: path.to_owned(), elapsed: start.elapsed() });
+    Ok(())
+}
+
+/// Writes the region of interest, stored or estimated, as text to `path`; `false`: there is none.
+///
+/// # Errors
+/// Unreadable files, a place that cannot be written.
+pub fn export_roi(job: &SceneJob, path: &Path, progress: &Progress) -> Result<bool> {
+    let loaded = load(job, progress)?;
+    let Some(obb) = interface_archive(&loaded, &no_cameras(&loaded), &[]).obb else { return Ok(false) };
+    let mut file = AtomicFile::create(path)?;
+    roi::write(&mut file, &obb).map_err(|e| Error::format(path, e))?;
+    file.commit()?;
+    Ok(true)
+}
+
+/// Writes the neighbour lists that came with the scene, or with the job's view-neighbour file, as text to `path`.
+///
+/// # Errors
+/// No image has neighbours; unreadable files; a place that cannot be written.
+pub fn export_neighbors(job: &SceneJob, path: &Path, progress: &Progress) -> Result<()> {
+    let loaded = load(job, progress)?;
+    let views = &loaded.scene.views;
+    if views.iter().all(|v| v.neighbors.is_empty()) {
+        let what = "no image has neighbours stored: densify the scene first, or give --view-neighbors-file";
+        return Err(Error::content(&loaded.path, what));
+    }
+    let lists: Vec<Vec<u32>> =
+        views.iter().map(|view| view.neighbors.iter().map(|n| n.view.0).collect()).collect();
+    let mut file = AtomicFile::create(path)?;
+    neighbors_file::write(&mut file, lists.iter().map(Vec::as_slice)).map_err(|e| Error::format(path, e))?;
+    file.commit()
+}
+
+/// Cameras stay as they are stored.
+fn no_cameras(loaded: &LoadedScene) -> Vec<Option<crate::geometry::Camera>> {
+    vec![None; loaded.scene.views.len()]
+}

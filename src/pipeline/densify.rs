@@ -1,0 +1,174 @@
+//! Everything from the scene to the dense cloud, in order.
+
+use super::estimate::{Estimation, existing_maps};
+use super::filter::filter_across_views;
+use super::fusing::{Fused, fuse_maps};
+use super::job::{DensifyJob, SceneJob};
+use super::outputs::{check_depth_maps, check_places, class_rows, cloud_rows, write_cloud, write_scene};
+use super::prepare::{Prepared, load, prepare};
+use super::record::{Clock, view_rows, with_threads};
+use super::sparse::SparseCloud;
+use crate::error::Result;
+use crate::fusion::{AttributeSource, FusionOptions, WithNormals};
+use crate::progress::{Event, Progress};
+use crate::report::{OutputReport, RunReport};
+use crate::scene::{PointSource, ViewIndex};
+use crate::stereo::CpuLevel;
+use crate::store::cameras::working_cameras;
+use crate::store::depth_store::DepthStore;
+use nalgebra::Vector3;
+use semvs_formats::Limits;
+use std::path::Path;
+
+/// Least memory for depth maps that are read again soon.
+const MIN_MAP_CACHE: usize = 128 << 20;
+/// Most memory for depth maps that are read again soon.
+const MAX_MAP_CACHE: usize = 4 << 30;
+/// Bytes per pixel of a depth map in memory.
+const MAP_BYTES: usize = 20;
+
+/// Runs `job`: depth maps of all views into their folder, then the cloud and its companions. The report lacks what
+/// only the program knows: its name, its options, the warnings.
+///
+/// # Errors
+/// Anything that keeps a result from being right; then files of earlier runs are as they were.
+pub fn densify(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport> {
+    with_threads(job.input.max_threads, || run(job, cpu, progress))
+}
+
+fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport> {
+    let mut clock = Clock::start();
+    job.check()?;
+    check_places(&job.outputs.without_labels(), None)?;
+    let loaded = load(&job.input, progress)?;
+    let cameras = working_cameras(&loaded, &job.resolution, job.input.strict)?;
+    clock.stage("load");
+    let prepared = prepare(&job.input, loaded, cameras, true, progress)?;
+    check_places(&job.outputs, prepared.labels.as_ref())?;
+    let store = depth_store(&job.input, &prepared, &job.depth_maps);
+    check_depth_maps(&prepared, &store)?;
+    clock.stage("prepare");
+
+    let use_existing = job.stereo.geometric_iterations == 0;
+    let existing = existing_maps(&prepared, &store, use_existing, progress)?;
+    let estimation = Estimation {
+        prepared: &prepared,
+        store: &store,
+        options: &job.stereo,
+        filter: &job.filter,
+        cpu,
+        progress,
+    };
+    let mapped = estimation.run(&existing)?;
+    clock.stage("estimate");
+    if job.filter.adjust {
+        filter_across_views(&prepared, &store, &mapped, &job.filter, progress)?;
+        clock.stage("filter");
+    }
+    let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
+    if job.depth_maps_only {
+        finish_depth_maps(job, &prepared, &mapped, &clock, progress, &mut report)?;
+    } else {
+        finish_cloud(job, &prepared, &store, &mapped, &mut clock, progress, &mut report)?;
+    }
+    report.views = view_rows(&prepared, &store, &mapped, &existing)?;
+    depth_map_rows(&prepared, &store, &mapped, &mut report);
+    if job.remove_depth_maps {
+        mapped.iter().try_for_each(|&view| store.delete(prepared.id(view)))?;
+        report.outputs.retain(|output| output.content != DEPTH_MAP);
+    }
+    clock.stage("write");
+    clock.finish(&mut report);
+    Ok(report)
+}
+
+/// What a report says of a depth map that was written.
+pub const DEPTH_MAP: &str = "depth map";
+
+fn depth_map_rows(prepared: &Prepared, store: &DepthStore, mapped: &[ViewIndex], report: &mut RunReport) {
+    report.outputs.extend(mapped.iter().map(|&view| OutputReport {
+        path: store.path(prepared.id(view)).display().to_string(),
+        content: DEPTH_MAP.to_owned(),
+        points: None,
+    }));
+}
+
+/// The store of a job's depth maps, with memory for what the threads work on at a time.
+pub(super) fn depth_store(job: &SceneJob, prepared: &Prepared, folder: &Path) -> DepthStore {
+    let pixels = prepared.cameras.iter().flatten().map(|c| c.size().area()).max().unwrap_or(0);
+    let in_hand = rayon::current_num_threads() * (1 + job.neighbors.number_views.max(8));
+    let cache = (in_hand * pixels * MAP_BYTES).clamp(MIN_MAP_CACHE, MAX_MAP_CACHE);
+    DepthStore::new(folder, prepared.loaded.search.clone(), cache, Limits::default())
+}
+
+fn finish_depth_maps(
+    job: &DensifyJob,
+    prepared: &Prepared,
+    mapped: &[ViewIndex],
+    clock: &Clock,
+    progress: &Progress,
+    report: &mut RunReport,
+) -> Result<()> {
+    let tracks = &prepared.loaded.scene.tracks;
+    progress.event(Event::DepthMapsCompleted {
+        maps: mapped.len(),
+        sparse_points: tracks.len(),
+        elapsed: clock.elapsed(),
+    });
+    if job.outputs.sparse_cloud && !tracks.is_empty() {
+        let outputs = job.outputs.without_labels();
+        let written = write_cloud(&outputs, &SparseCloud(tracks), None, progress)?;
+        report.outputs.extend(cloud_rows(&written, None));
+    }
+    write_scene(&job.outputs, prepared, progress)?;
+    report.outputs.extend(job.outputs.scene_row());
+    Ok(())
+}
+
+fn finish_cloud(
+    job: &DensifyJob,
+    prepared: &Prepared,
+    store: &DepthStore,
+    mapped: &[ViewIndex],
+    clock: &mut Clock,
+    progress: &Progress,
+    report: &mut RunReport,
+) -> Result<()> {
+    let folder = job.outputs.folder();
+    let fused = fuse_maps(prepared, store, mapped, &job.fusion, &job.input.roi, folder, progress)?;
+    clock.stage("fuse");
+    progress.event(Event::Densified { points: fused.cloud.len(), elapsed: clock.elapsed() });
+    write_results(&job.outputs, prepared, &fused, &job.fusion, progress, report)
+}
+
+/// Writes cloud and scene, and enters them in the report.
+pub(super) fn write_results(
+    outputs: &super::Outputs,
+    prepared: &Prepared,
+    fused: &Fused,
+    options: &FusionOptions,
+    progress: &Progress,
+    report: &mut RunReport,
+) -> Result<()> {
+    let labels = prepared.labels.as_ref();
+    let written = if options.estimate_normals == AttributeSource::AfterFusion {
+        let centers: Vec<Vector3<f64>> = prepared
+            .loaded
+            .scene
+            .views
+            .iter()
+            .map(|v| v.calibration.as_ref().map_or_else(Vector3::zeros, |c| c.center))
+            .collect();
+        write_cloud(outputs, &WithNormals::estimate(&fused.cloud, &centers)?, labels, progress)?
+    } else {
+        write_cloud(outputs, &fused.cloud, labels, progress)?
+    };
+    report.points = fused.cloud.len();
+    report.outputs.extend(cloud_rows(&written, labels));
+    if let Some(labels) = labels {
+        report.classes = class_rows(&fused.summary, &written, labels);
+    }
+    write_scene(outputs, prepared, progress)?;
+    report.outputs.extend(outputs.scene_row());
+    Ok(())
+}

@@ -1,0 +1,62 @@
+//! The filter across views: every depth is held against the maps of the neighbours.
+
+use super::estimate::{for_each_view, replace_all};
+use super::job::FilterJob;
+use super::prepare::Prepared;
+use crate::depth_filter::{FilterView, MAX_NEIGHBORS, filter_consistency};
+use crate::error::Result;
+use crate::progress::{Event, Progress, Stage};
+use crate::scene::{DepthEstimate, DepthMap, ImageId, ViewIndex};
+use crate::store::depth_store::DepthStore;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Replaces the maps of `views` by filtered ones; all read the maps as they were.
+///
+/// # Errors
+/// A map cannot be read or written.
+pub(super) fn filter_across_views(
+    prepared: &Prepared,
+    store: &DepthStore,
+    views: &[ViewIndex],
+    filter: &FilterJob,
+    progress: &Progress,
+) -> Result<()> {
+    let ids: BTreeSet<ImageId> = views.iter().map(|&v| prepared.id(v)).collect();
+    let steps = progress.start(Stage::Filter, views.len());
+    replace_all(store, &ids, || {
+        for_each_view(views, |view| {
+            let start = Instant::now();
+            let reference = store.read(prepared.id(view))?;
+            let neighbors = prepared.neighbors[view.index()]
+                .retained
+                .iter()
+                .map(|n| prepared.id(n.view))
+                .filter(|id| ids.contains(id))
+                .take(MAX_NEIGHBORS)
+                .map(|id| store.read(id))
+                .collect::<Result<Vec<Arc<DepthEstimate>>>>()?;
+            let against: Vec<FilterView<'_>> = neighbors.iter().map(|n| FilterView::new(n)).collect();
+            let mut filtered =
+                filter_consistency(&FilterView::new(&reference), &against, prepared.count(), &filter.options);
+            filtered.image_name.clone_from(&prepared.loaded.scene.views[view.index()].name);
+            store.write_pending(&filtered)?;
+            let (before, after) = (valid_depths(&reference.depth), valid_depths(&filtered.depth));
+            progress.event(Event::DepthFiltered {
+                reference: prepared.id(view),
+                sources: against.len(),
+                discarded: before.saturating_sub(after),
+                processed: before,
+                elapsed: start.elapsed(),
+            });
+            steps.step();
+            Ok(())
+        })
+    })
+}
+
+/// Number of pixels with a depth.
+pub(super) fn valid_depths(depth: &DepthMap) -> usize {
+    depth.data().iter().filter(|&&d| d > 0.0).count()
+}

@@ -1,0 +1,121 @@
+//! Depth maps that exist to a cloud.
+
+use super::densify::{depth_store, write_results};
+use super::fusing::fuse_maps;
+use super::job::FuseJob;
+use super::outputs::check_places;
+use super::prepare::{load, prepare};
+use super::record::{Clock, view_rows, with_threads};
+use crate::error::{Error, Result};
+use crate::fusion::AttributeSource;
+use crate::geometry::{Camera, Size};
+use crate::progress::{Event, Progress};
+use crate::report::RunReport;
+use crate::scene::{PointSource, ResolutionOptions, View, ViewIndex};
+use crate::store::cameras::working_cameras;
+use crate::store::depth_store::{DepthStore, Existing};
+use crate::store::import::LoadedScene;
+use semvs_formats::Limits;
+use std::collections::BTreeSet;
+
+/// Runs `job`. Depth maps are only read. The report lacks what only the program knows.
+///
+/// # Errors
+/// A depth map does not belong to the scene, there is none, or an output cannot be written.
+pub fn fuse(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
+    with_threads(job.input.max_threads, || run(job, progress))
+}
+
+fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
+    let mut clock = Clock::start();
+    job.check()?;
+    if !job.depth_maps.is_dir() {
+        return Err(Error::content(&job.depth_maps, "no such folder of depth maps (--depth-maps)"));
+    }
+    check_places(&job.outputs.without_labels(), None)?;
+    let loaded = load(&job.input, progress)?;
+    let headers = DepthStore::new(&job.depth_maps, loaded.search.clone(), 0, Limits::default());
+    let cameras = match &job.resolution {
+        Some(resolution) => working_cameras(&loaded, resolution, job.input.strict)?,
+        None => map_cameras(&loaded, &headers, job.input.strict)?,
+    };
+    let mapped = maps_of_the_scene(&loaded, &cameras, &headers)?;
+    clock.stage("load");
+    let decode = job.fusion.estimate_colors != AttributeSource::None;
+    let prepared = prepare(&job.input, loaded, cameras, decode, progress)?;
+    let mapped: Vec<ViewIndex> =
+        mapped.into_iter().filter(|v| prepared.cameras[v.index()].is_some()).collect();
+    check_places(&job.outputs, prepared.labels.as_ref())?;
+    let store = depth_store(&job.input, &prepared, &job.depth_maps);
+    clock.stage("prepare");
+
+    let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
+    let folder = job.outputs.folder();
+    let fused = fuse_maps(&prepared, &store, &mapped, &job.fusion, &job.input.roi, folder, progress)?;
+    clock.stage("fuse");
+    progress.event(Event::Densified { points: fused.cloud.len(), elapsed: clock.elapsed() });
+    write_results(&job.outputs, &prepared, &fused, &job.fusion, progress, &mut report)?;
+    let reused: BTreeSet<ViewIndex> = mapped.iter().copied().collect();
+    report.views = view_rows(&prepared, &store, &mapped, &reused)?;
+    clock.stage("write");
+    clock.finish(&mut report);
+    Ok(report)
+}
+
+/// The cameras at the sizes of the depth maps; views without a map get the reduction of the first map.
+fn map_cameras(loaded: &LoadedScene, store: &DepthStore, strict: bool) -> Result<Vec<Option<Camera>>> {
+    let full = ResolutionOptions { level: 0, max: u32::MAX, ..ResolutionOptions::default() };
+    let full_size = working_cameras(loaded, &full, strict)?;
+    let mut sizes: Vec<Option<Size>> = Vec::with_capacity(full_size.len());
+    let mut reduction = None;
+    for (view, camera) in loaded.scene.views.iter().zip(&full_size) {
+        let header = if camera.is_some() { store.header(view.id)? } else { None };
+        let size = header.map(|h| Size::new(h.width, h.height));
+        if let (Some(size), Some(camera)) = (size, camera) {
+            reduction.get_or_insert((size.longest(), camera.size().longest()));
+        }
+        sizes.push(size);
+    }
+    let Some((small, large)) = reduction else { return Err(no_maps(store)) };
+    let camera_of = |view: &View, full: Size, of_map: Option<Size>| {
+        let longest = match of_map {
+            Some(size) => size.longest(),
+            None => (u64::from(full.longest()) * u64::from(small) / u64::from(large)) as u32,
+        };
+        let at = ResolutionOptions { level: 0, max: longest.max(1), ..ResolutionOptions::default() };
+        view.calibration.as_ref().map(|c| c.camera_at(at.working_size(full)))
+    };
+    let views = loaded.scene.views.iter().zip(&full_size).zip(sizes);
+    Ok(views
+        .map(|((view, full), size)| full.as_ref().and_then(|full| camera_of(view, full.size(), size)))
+        .collect())
+}
+
+/// The views whose depth maps are in the folder; every one found must belong to the scene.
+fn maps_of_the_scene(
+    loaded: &LoadedScene,
+    cameras: &[Option<Camera>],
+    store: &DepthStore,
+) -> Result<Vec<ViewIndex>> {
+    let mut found = Vec::new();
+    for (i, (view, camera)) in loaded.scene.views.iter().zip(cameras).enumerate() {
+        let Some(camera) = camera else { continue };
+        match store.existing(view.id, camera) {
+            Existing::Absent => {}
+            Existing::Usable => found.push(ViewIndex(i as u32)),
+            Existing::Unusable(why) => {
+                return Err(Error::invalid(format!(
+                    "{why}; give the scene and the options that it was made with, or remove it"
+                )));
+            }
+        }
+    }
+    if found.is_empty() { Err(no_maps(store)) } else { Ok(found) }
+}
+
+fn no_maps(store: &DepthStore) -> Error {
+    Error::content(
+        store.folder(),
+        "no depth map of the scene's images is here; they are named depthNNNN.dmap by the images' IDs",
+    )
+}

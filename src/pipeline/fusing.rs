@@ -1,0 +1,146 @@
+//! Depth maps to a cropped cloud.
+
+use super::job::RoiJob;
+use super::prepare::Prepared;
+use crate::depth_filter::normals_from_depth;
+use crate::error::{Error, Result};
+use crate::fusion::{
+    AttributeSource, FusionInput, FusionMaps, FusionOptions, FusionSummary, FusionView, MapInfo, MapSource,
+    fuse,
+};
+use crate::geometry::Size;
+use crate::progress::{Event, Progress};
+use crate::scene::{DepthEstimate, PointSource, ViewIndex};
+use crate::store::depth_store::DepthStore;
+use crate::store::spool::{DEFAULT_SPOOL_MEMORY, PointSpool, SpooledCloud};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A cloud in its final order, and how it came about.
+pub(super) struct Fused {
+    pub(super) cloud: SpooledCloud,
+    pub(super) summary: FusionSummary,
+}
+
+/// Fuses the maps of `views`. Points beyond memory wait in `folder`.
+///
+/// # Errors
+/// A map or an image cannot be read; the folder cannot be written.
+pub(super) fn fuse_maps(
+    prepared: &Prepared,
+    store: &DepthStore,
+    views: &[ViewIndex],
+    options: &FusionOptions,
+    roi: &RoiJob,
+    folder: &Path,
+    progress: &Progress,
+) -> Result<Fused> {
+    let start = Instant::now();
+    let derive_normals = options.estimate_normals == AttributeSource::DuringFusion;
+    let maps = FusionSource {
+        prepared,
+        store,
+        colors: options.estimate_colors != AttributeSource::None,
+        derive_normals,
+        progress,
+    };
+    let fusion_views = fusion_views(prepared, store, views, derive_normals)?;
+    let policy = prepared.labels.as_ref().map(|labels| labels.policy());
+    let input = FusionInput { views: &fusion_views, source: &maps, policy };
+    let region = prepared.loaded.scene.roi.as_ref().filter(|_| roi.crop);
+    let crop = region.map(|region| region.with_border(roi.border)).transpose()?;
+    let mut spool = PointSpool::new(input.layout(options), crop, folder, DEFAULT_SPOOL_MEMORY);
+    let summary = fuse(&input, options, progress, &mut spool)?;
+    let cloud = spool.finish()?;
+    progress.event(Event::Fused {
+        maps: summary.maps,
+        depths: summary.depths,
+        points: summary.points,
+        elapsed: start.elapsed(),
+    });
+    if cloud.cropped() > 0 {
+        progress.info(format!(
+            "{} points outside the region of interest are left out, {} remain",
+            cloud.cropped(),
+            cloud.len()
+        ));
+    }
+    Ok(Fused { cloud, summary })
+}
+
+/// All views of the scene as fusion wants them; those of `views` have maps.
+fn fusion_views(
+    prepared: &Prepared,
+    store: &DepthStore,
+    views: &[ViewIndex],
+    derive_normals: bool,
+) -> Result<Vec<FusionView>> {
+    let mut out: Vec<FusionView> = prepared
+        .neighbors
+        .iter()
+        .map(|n| FusionView {
+            maps: None,
+            neighbors: n.retained.iter().map(|r| r.view).collect(),
+            neighbor_count: n.all.len(),
+        })
+        .collect();
+    for &view in views {
+        let id = prepared.id(view);
+        let header = store
+            .header(id)?
+            .ok_or_else(|| Error::content(&store.path(id), "the depth map is gone; run again"))?;
+        let size = Size::new(header.width, header.height);
+        out[view.index()].maps = Some(MapInfo { size, normals: header.has_normal || derive_normals });
+    }
+    Ok(out)
+}
+
+struct FusionSource<'a> {
+    prepared: &'a Prepared,
+    store: &'a DepthStore,
+    colors: bool,
+    /// Maps without normals get them from the shape of their depths.
+    derive_normals: bool,
+    progress: &'a Progress,
+}
+
+impl MapSource for FusionSource<'_> {
+    fn load(&self, view: ViewIndex) -> Result<FusionMaps> {
+        let mut estimate = self.unmasked(view, self.store.read(self.prepared.id(view))?);
+        if self.derive_normals && estimate.normal.is_none() {
+            let normal = normals_from_depth(&estimate.depth, &estimate.camera);
+            estimate = Arc::new(DepthEstimate { normal: Some(normal), ..DepthEstimate::clone(&estimate) });
+        }
+        let size = estimate.depth.size();
+        let color = self.colors.then(|| self.prepared.images.color(view, size)).transpose()?;
+        let (labels, checked_labels) = match &self.prepared.labels {
+            Some(labels) => {
+                let (map, checked) = labels.maps(view, size)?;
+                (Some(map), checked)
+            }
+            None => (None, None),
+        };
+        Ok(FusionMaps { estimate, color, labels, checked_labels })
+    }
+}
+
+impl FusionSource<'_> {
+    /// The estimate without the depths of masked pixels, which maps made elsewhere may have.
+    fn unmasked(&self, view: ViewIndex, estimate: Arc<DepthEstimate>) -> Arc<DepthEstimate> {
+        let masks = self.prepared.masks.as_ref();
+        let ignored = masks.and_then(|m| m.ignored(view, estimate.depth.size(), self.progress));
+        let Some(ignored) = ignored else { return estimate };
+        let covers = |(depth, ignored): (&f32, &bool)| *ignored && *depth > 0.0;
+        if !estimate.depth.data().iter().zip(ignored.data()).any(covers) {
+            return estimate;
+        }
+        let mut estimate = DepthEstimate::clone(&estimate);
+        for (depth, &ignored) in estimate.depth.data_mut().iter_mut().zip(ignored.data()) {
+            if ignored {
+                *depth = 0.0;
+            }
+        }
+        Arc::new(estimate)
+    }
+}

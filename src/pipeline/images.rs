@@ -1,0 +1,101 @@
+//! The photographs at working size, decoded when they are needed and kept within a budget.
+
+use crate::error::{Error, Result};
+use crate::geometry::{Camera, Size};
+use crate::progress::{Progress, Stage};
+use crate::scene::{ColorImage, GrayImage, ResolutionOptions, ViewIndex, gray_from_color};
+use crate::store::byte_cache::ByteCache;
+use crate::store::images::load_working_color;
+use crate::store::import::LoadedScene;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Bytes of images of either kind that are kept.
+const CACHE_BYTES: usize = 192 << 20;
+
+/// The photographs of a scene's views.
+#[derive(Debug)]
+pub(super) struct Images {
+    paths: Vec<PathBuf>,
+    grays: ByteCache<ViewIndex, GrayImage>,
+    colors: ByteCache<ViewIndex, ColorImage>,
+}
+
+impl Images {
+    /// The photographs of all views; nothing is read yet.
+    pub(super) fn new(loaded: &LoadedScene) -> Self {
+        let views = 0..loaded.scene.views.len();
+        Images {
+            paths: views.map(|i| loaded.image_path(ViewIndex(i as u32))).collect(),
+            grays: ByteCache::new(CACHE_BYTES),
+            colors: ByteCache::new(CACHE_BYTES),
+        }
+    }
+
+    /// The file of a view.
+    pub(super) fn path(&self, view: ViewIndex) -> &PathBuf {
+        &self.paths[view.index()]
+    }
+
+    /// The colours of a view at exactly `size`.
+    ///
+    /// # Errors
+    /// The file cannot be decoded or has another shape.
+    pub(super) fn color(&self, view: ViewIndex, size: Size) -> Result<Arc<ColorImage>> {
+        let image = self.colors.get_or_load(view, || {
+            let image = load_working_color(self.path(view), &at_longest(size))?;
+            let bytes = size_of_val(image.data());
+            Ok((image, bytes))
+        })?;
+        self.require_size(view, image.size(), size)?;
+        Ok(image)
+    }
+
+    /// The luma of a view at exactly `size`.
+    ///
+    /// # Errors
+    /// As [`Images::color`].
+    pub(super) fn gray(&self, view: ViewIndex, size: Size) -> Result<Arc<GrayImage>> {
+        let image = self.grays.get_or_load(view, || {
+            let image = gray_from_color(&*self.color(view, size)?);
+            let bytes = size_of_val(image.data());
+            Ok((image, bytes))
+        })?;
+        self.require_size(view, image.size(), size)?;
+        Ok(image)
+    }
+
+    fn require_size(&self, view: ViewIndex, found: Size, wanted: Size) -> Result<()> {
+        if found == wanted {
+            return Ok(());
+        }
+        Err(Error::content(self.path(view), format!("scales to {found} pixels, {wanted} are needed")))
+    }
+
+    /// Decodes the photograph of every view that has a camera, in parallel, and returns what is wrong with those
+    /// that cannot be used.
+    pub(super) fn check(&self, cameras: &[Option<Camera>], progress: &Progress) -> Vec<(ViewIndex, Error)> {
+        let used: Vec<(ViewIndex, Size)> = cameras
+            .iter()
+            .enumerate()
+            .filter_map(|(i, camera)| camera.as_ref().map(|c| (ViewIndex(i as u32), c.size())))
+            .collect();
+        let steps = progress.start(Stage::PrepareImages, used.len());
+        let results: Vec<Option<(ViewIndex, Error)>> = used
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|(view, size)| {
+                let failed = self.gray(view, size).err().map(|error| (view, error));
+                steps.step();
+                failed
+            })
+            .collect();
+        results.into_iter().flatten().collect()
+    }
+}
+
+/// The resolution at which an image gets `size`.
+fn at_longest(size: Size) -> ResolutionOptions {
+    ResolutionOptions { level: 0, max: size.longest(), ..ResolutionOptions::default() }
+}

@@ -1,0 +1,108 @@
+//! What is in an image, mask, label map or class table.
+
+use super::bytes_of;
+use crate::error::{Error, Result};
+use crate::semantics::ClassTable;
+use crate::store::images::{image_size, load_color};
+use serde::Serialize;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// A photograph, a mask or a label map.
+#[derive(Clone, Debug, Serialize)]
+pub struct PictureFacts {
+    /// The file.
+    pub file: String,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Distinct colours with their numbers of pixels, most frequent first, when there are few, as in label maps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub colors: Vec<ColorShare>,
+}
+
+/// A colour of a label map.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ColorShare {
+    /// Red, green, blue; grey ids have three equal values.
+    pub color: [u8; 3],
+    /// Pixels.
+    pub pixels: u64,
+    /// The same as a share of all pixels.
+    pub share: f64,
+}
+
+/// More distinct colours make a photograph.
+const MAX_COLORS: usize = 256;
+
+pub(super) fn inspect(path: &Path) -> Result<PictureFacts> {
+    let size = image_size(path)?;
+    let image = load_color(path)?;
+    let mut counts: HashMap<[u8; 3], u64> = HashMap::new();
+    for color in image.data() {
+        *counts.entry(*color).or_default() += 1;
+        if counts.len() > MAX_COLORS {
+            counts.clear();
+            break;
+        }
+    }
+    let area = size.area().max(1) as f64;
+    let mut colors: Vec<ColorShare> = counts
+        .into_iter()
+        .map(|(color, pixels)| ColorShare { color, pixels, share: pixels as f64 / area })
+        .collect();
+    colors.sort_by_key(|c| (std::cmp::Reverse(c.pixels), c.color));
+    Ok(PictureFacts {
+        file: path.display().to_string(),
+        bytes: bytes_of(path)?,
+        width: size.width,
+        height: size.height,
+        colors,
+    })
+}
+
+/// A class table.
+#[derive(Clone, Debug, Serialize)]
+pub struct ClassTableFacts {
+    /// The file.
+    pub file: String,
+    /// Name in the table.
+    pub name: String,
+    /// Its classes by id.
+    pub classes: Vec<ClassFacts>,
+}
+
+/// A class.
+#[derive(Clone, Debug, Serialize)]
+pub struct ClassFacts {
+    /// Id.
+    pub id: u16,
+    /// Name.
+    pub name: String,
+    /// Colour in label maps.
+    pub color: Option<[u8; 3]>,
+    /// Whether its points are kept.
+    pub keep: bool,
+    /// ASPRS LAS class.
+    pub las: Option<u8>,
+}
+
+/// Longest class table that is read.
+const MAX_TABLE_BYTES: u64 = 64 << 20;
+
+pub(super) fn inspect_table(path: &Path) -> Result<ClassTableFacts> {
+    if bytes_of(path)? > MAX_TABLE_BYTES {
+        return Err(Error::content(path, "too long for a class table"));
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    let table = ClassTable::from_toml(&text, path)?;
+    let classes = table
+        .classes()
+        .iter()
+        .map(|c| ClassFacts { id: c.id.0, name: c.name.clone(), color: c.color, keep: c.keep, las: c.las })
+        .collect();
+    Ok(ClassTableFacts { file: path.display().to_string(), name: table.name().to_owned(), classes })
+}

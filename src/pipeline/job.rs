@@ -1,0 +1,224 @@
+//! Jobs: what the programs ask the pipeline to do, with every value resolved.
+
+use crate::depth_filter::DepthFilterOptions;
+use crate::error::{Error, Result};
+use crate::fusion::FusionOptions;
+use crate::report::OutputReport;
+use crate::scene::{NeighborOptions, ResolutionOptions, RoiEstimation};
+use crate::semantics::ClassRules;
+use crate::stereo::StereoOptions;
+use crate::store::cloud::PlyLayout;
+use crate::store::labels::LabelSources;
+use std::path::{Path, PathBuf};
+
+/// The scene and everything that is done before depth maps come into play.
+#[derive(Clone, Debug)]
+pub struct SceneJob {
+    /// The `.mvs` file.
+    pub scene: PathBuf,
+    /// First place of images named by the scene; the second is the scene's folder.
+    pub working_folder: PathBuf,
+    /// PLY with view lists that replaces the sparse points.
+    pub pointcloud_file: Option<PathBuf>,
+    /// Neighbour lists that replace those of the scene.
+    pub view_neighbors_file: Option<PathBuf>,
+    /// View selection.
+    pub neighbors: NeighborOptions,
+    /// Region of interest.
+    pub roi: RoiJob,
+    /// Masks, if they are used.
+    pub masks: Option<MaskJob>,
+    /// Labels, if they are used.
+    pub labels: Option<LabelJob>,
+    /// An image or a depth map that cannot be used is an error.
+    pub strict: bool,
+    /// Threads; 0 = all of the machine.
+    pub max_threads: usize,
+}
+
+/// What part of the scene is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoiJob {
+    /// When a scene without region of interest gets one.
+    pub estimate: RoiEstimation,
+    /// Above 0 the half extents are multiplied by it, below 0 they grow by its absolute value. Default 0.
+    pub border: f32,
+    /// Drop points outside. Default true.
+    pub crop: bool,
+}
+
+/// Pixels without depth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskJob {
+    /// Mask value of the pixels to ignore.
+    pub ignore: u16,
+    /// Folder of masks; `None`: those that the scene names, else beside the images.
+    pub folder: Option<PathBuf>,
+}
+
+/// Semantic labels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelJob {
+    /// Where label maps and classes come from.
+    pub sources: LabelSources,
+    /// What to keep and how labels restrict fusion.
+    pub rules: ClassRules,
+}
+
+/// `densify`: everything.
+#[derive(Clone, Debug)]
+pub struct DensifyJob {
+    /// The scene.
+    pub input: SceneJob,
+    /// Size at which images are matched.
+    pub resolution: ResolutionOptions,
+    /// Folder of the depth maps.
+    pub depth_maps: PathBuf,
+    /// Estimation.
+    pub stereo: StereoOptions,
+    /// Cleaning.
+    pub filter: FilterJob,
+    /// Stop before fusion.
+    pub depth_maps_only: bool,
+    /// Delete the depth maps at the end.
+    pub remove_depth_maps: bool,
+    /// Fusion.
+    pub fusion: FusionOptions,
+    /// What to write.
+    pub outputs: Outputs,
+}
+
+/// Which filters run on the depth maps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterJob {
+    /// Remove small regions.
+    pub speckles: bool,
+    /// Fill small gaps.
+    pub gaps: bool,
+    /// Filter across views.
+    pub adjust: bool,
+    /// Thresholds.
+    pub options: DepthFilterOptions,
+}
+
+impl FilterJob {
+    /// The filters of OpenMVS's `--postprocess-dmaps`.
+    ///
+    /// # Errors
+    /// Bits that mean nothing.
+    pub fn from_bits(bits: u32, options: DepthFilterOptions) -> Result<Self> {
+        if bits > 7 {
+            let what =
+                format!("--postprocess-dmaps {bits}: give a sum of 1 (speckles), 2 (gaps), 4 (adjust)");
+            return Err(Error::invalid(what));
+        }
+        Ok(FilterJob { speckles: bits & 1 != 0, gaps: bits & 2 != 0, adjust: bits & 4 != 0, options })
+    }
+}
+
+/// `fuse`: depth maps that exist.
+#[derive(Clone, Debug)]
+pub struct FuseJob {
+    /// The scene.
+    pub input: SceneJob,
+    /// Size that the depth maps must have; `None`: any size that fits the image.
+    pub resolution: Option<ResolutionOptions>,
+    /// Folder of the depth maps.
+    pub depth_maps: PathBuf,
+    /// Fusion.
+    pub fusion: FusionOptions,
+    /// What to write.
+    pub outputs: Outputs,
+}
+
+/// Files to write.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outputs {
+    /// The cloud; its other forms are named after it.
+    pub cloud: PathBuf,
+    /// The scene with its neighbours.
+    pub scene: Option<PathBuf>,
+    /// Properties of the points.
+    pub layout: PlyLayout,
+    /// One cloud per class.
+    pub split_by_class: bool,
+    /// A cloud in class colours.
+    pub color_by_label: bool,
+    /// JSON summary.
+    pub report: Option<PathBuf>,
+    /// Write the sparse points as the cloud when only depth maps are wanted, as OpenMVS does.
+    pub sparse_cloud: bool,
+}
+
+impl Outputs {
+    /// The same without what needs labels.
+    pub(super) fn without_labels(&self) -> Outputs {
+        Outputs { split_by_class: false, color_by_label: false, ..self.clone() }
+    }
+
+    /// Refuses outputs by class in a run without labels.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the option.
+    pub(super) fn check_labels(&self, has_labels: bool) -> Result<()> {
+        let asked = [(self.split_by_class, "--split-by-class"), (self.color_by_label, "--color-by-label")];
+        match asked.iter().find(|(asked, _)| *asked && !has_labels) {
+            Some((_, option)) => Err(Error::invalid(format!(
+                "{option} needs labels: give --label-path, --class-table or both"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Folder of the cloud.
+    pub(super) fn folder(&self) -> &Path {
+        match self.cloud.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        }
+    }
+
+    /// The scene in a report.
+    pub(super) fn scene_row(&self) -> Option<OutputReport> {
+        let path = self.scene.as_ref()?.display().to_string();
+        Some(OutputReport { path, content: "scene".to_owned(), points: None })
+    }
+}
+
+impl SceneJob {
+    fn check(&self) -> Result<()> {
+        self.neighbors.check()?;
+        if !self.roi.border.is_finite() {
+            return Err(Error::invalid("--roi-border must be a finite number"));
+        }
+        Ok(())
+    }
+}
+
+impl DensifyJob {
+    /// Checks all values that can be checked without files.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        self.input.check()?;
+        self.resolution.check()?;
+        self.stereo.check()?;
+        self.filter.options.check()?;
+        self.fusion.check()?;
+        self.outputs.check_labels(self.input.labels.is_some())
+    }
+}
+
+impl FuseJob {
+    /// Checks all values that can be checked without files.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        self.input.check()?;
+        self.resolution.as_ref().map_or(Ok(()), ResolutionOptions::check)?;
+        self.fusion.check()?;
+        self.outputs.check_labels(self.input.labels.is_some())
+    }
+}

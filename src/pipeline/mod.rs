@@ -1,0 +1,26 @@
+//! The jobs of the programs. The only module that knows the order of the stages.
+
+mod actions;
+mod convert;
+mod densify;
+mod estimate;
+mod evaluate;
+mod filter;
+mod fuse;
+mod fusing;
+mod images;
+pub mod inspect;
+mod job;
+mod outputs;
+mod prepare;
+mod problem;
+mod record;
+mod skip;
+mod sparse;
+
+pub use actions::{export_neighbors, export_roi, import_roi};
+pub use convert::{ConvertJob, convert};
+pub use densify::{DEPTH_MAP, densify};
+pub use evaluate::{EvaluateJob, evaluate};
+pub use fuse::fuse;
+pub use job::{DensifyJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob, SceneJob};

@@ -1,0 +1,128 @@
+//! What a run writes at its end, and whether it can, asked at its start.
+
+use super::job::Outputs;
+use super::prepare::Prepared;
+use super::skip::Labels;
+use crate::error::Result;
+use crate::fusion::FusionSummary;
+use crate::progress::{Event, Progress};
+use crate::report::{ClassRow, OutputReport, fill_shares};
+use crate::scene::PointSource;
+use crate::semantics::ClassId;
+use crate::store::atomic::check_writable;
+use crate::store::cloud::{CloudOptions, WrittenClouds, check_cloud_paths, write_clouds};
+use crate::store::depth_store::DepthStore;
+use crate::store::export::{interface_archive, write_interface};
+use std::time::Instant;
+
+/// Checks that everything can be written, creating missing folders.
+///
+/// # Errors
+/// The first place that cannot; options about labels without labels.
+pub(super) fn check_places(outputs: &Outputs, labels: Option<&Labels>) -> Result<()> {
+    let options = cloud_options(outputs, labels);
+    check_cloud_paths(&outputs.cloud, &options, labels.map(Labels::policy))?;
+    [&outputs.scene, &outputs.report].into_iter().flatten().try_for_each(|path| check_writable(path))
+}
+
+/// Checks that depth maps can be written, creating the folder.
+///
+/// # Errors
+/// They cannot.
+pub(super) fn check_depth_maps(prepared: &Prepared, store: &DepthStore) -> Result<()> {
+    prepared.views().try_for_each(|view| check_writable(&store.path(prepared.id(view))))
+}
+
+fn cloud_options<'a>(outputs: &Outputs, labels: Option<&'a Labels>) -> CloudOptions<'a> {
+    CloudOptions {
+        layout: outputs.layout,
+        table: labels.map(Labels::table),
+        split_by_class: outputs.split_by_class,
+        color_by_label: outputs.color_by_label,
+    }
+}
+
+/// Writes the cloud in all its forms.
+///
+/// # Errors
+/// A file cannot be written.
+pub(super) fn write_cloud(
+    outputs: &Outputs,
+    cloud: &dyn PointSource,
+    labels: Option<&Labels>,
+    progress: &Progress,
+) -> Result<WrittenClouds> {
+    let start = Instant::now();
+    let written = write_clouds(cloud, &outputs.cloud, &cloud_options(outputs, labels), progress)?;
+    for file in &written.files {
+        progress.event(Event::CloudSaved {
+            path: file.path.clone(),
+            points: file.points,
+            elapsed: start.elapsed(),
+        });
+    }
+    Ok(written)
+}
+
+/// Writes the scene with its neighbours.
+///
+/// # Errors
+/// The file cannot be written.
+pub(super) fn write_scene(outputs: &Outputs, prepared: &Prepared, progress: &Progress) -> Result<()> {
+    let Some(path) = &outputs.scene else { return Ok(()) };
+    let start = Instant::now();
+    let archive = interface_archive(&prepared.loaded, &prepared.cameras, &prepared.neighbors);
+    write_interface(path, &archive)?;
+    progress.event(Event::SceneSaved { path: path.clone(), elapsed: start.elapsed() });
+    Ok(())
+}
+
+/// The rows of a report about written clouds.
+pub(super) fn cloud_rows(written: &WrittenClouds, labels: Option<&Labels>) -> Vec<OutputReport> {
+    let content = |class: Option<ClassId>, label_colors: bool| match (class, labels) {
+        (Some(id), Some(labels)) => format!("dense cloud of class {}", labels.table().class_name(id)),
+        _ if label_colors => "dense cloud in class colours".to_owned(),
+        _ => "dense cloud".to_owned(),
+    };
+    written
+        .files
+        .iter()
+        .map(|file| OutputReport {
+            path: file.path.display().to_string(),
+            content: content(file.class, file.label_colors),
+            points: Some(file.points),
+        })
+        .collect()
+}
+
+/// What became of every class: pixels as fusion saw them, points as written.
+pub(super) fn class_rows(summary: &FusionSummary, written: &WrittenClouds, labels: &Labels) -> Vec<ClassRow> {
+    let table = labels.table();
+    let mut ids: Vec<ClassId> = table.classes().iter().map(|c| c.id).collect();
+    ids.extend(summary.classes.iter().map(|c| ClassId(c.id)));
+    ids.push(ClassId::VOID);
+    ids.sort_unstable();
+    ids.dedup();
+    let mut rows: Vec<ClassRow> = ids
+        .into_iter()
+        .map(|id| {
+            let counts = summary.classes.iter().find(|c| c.id == id.0).copied().unwrap_or_default();
+            let points = written.classes.get(&id).copied().unwrap_or_default();
+            ClassRow {
+                id: id.0,
+                name: table.class_name(id).into_owned(),
+                color: table.color(id),
+                kept: labels.policy().is_kept(id),
+                pixels: counts.pixels,
+                depths: counts.depths,
+                points: points.points,
+                share: 0.0,
+                mean_confidence: (points.points > 0).then(|| points.confidence_sum / points.points as f64),
+                rejected: counts.rejected_by_consistency,
+                excluded: counts.rejected_by_class,
+            }
+        })
+        .collect();
+    fill_shares(&mut rows);
+    rows
+}

@@ -1,0 +1,161 @@
+//! From the scene file to views that know their image, camera and neighbours.
+
+use super::images::Images;
+use super::job::SceneJob;
+use super::skip::{Labels, Masks};
+use super::sparse::{override_from_file, replace_points};
+use crate::error::{Error, Result};
+use crate::geometry::Camera;
+use crate::progress::{Event, Progress};
+use crate::scene::{ImageId, ViewIndex, ViewNeighbors, estimate_roi, select_neighbors};
+use crate::store::import::{LoadedScene, load_scene};
+use semvs_formats::Limits;
+use std::time::Instant;
+
+/// A scene that is ready for depth maps.
+pub(super) struct Prepared {
+    pub(super) loaded: LoadedScene,
+    /// Camera of every view at the size of its maps; `None`: the view takes no part.
+    pub(super) cameras: Vec<Option<Camera>>,
+    /// Why a calibrated view takes no part.
+    pub(super) dropped: Vec<Option<String>>,
+    pub(super) neighbors: Vec<ViewNeighbors>,
+    pub(super) images: Images,
+    pub(super) masks: Option<Masks>,
+    pub(super) labels: Option<Labels>,
+}
+
+impl Prepared {
+    /// Global ID of a view.
+    pub(super) fn id(&self, view: ViewIndex) -> ImageId {
+        self.loaded.scene.views[view.index()].id
+    }
+
+    /// Camera of a view that takes part.
+    ///
+    /// # Errors
+    /// It does not.
+    pub(super) fn camera(&self, view: ViewIndex) -> Result<&Camera> {
+        self.cameras[view.index()]
+            .as_ref()
+            .ok_or_else(|| Error::invalid(format!("image {} takes no part", self.id(view))))
+    }
+
+    /// Views that take part, in the scene's order.
+    pub(super) fn views(&self) -> impl Iterator<Item = ViewIndex> + '_ {
+        (0..self.cameras.len()).filter(|&i| self.cameras[i].is_some()).map(|i| ViewIndex(i as u32))
+    }
+
+    /// Number of views that take part.
+    pub(super) fn count(&self) -> usize {
+        self.cameras.iter().flatten().count()
+    }
+
+    /// Views that have something to be matched with.
+    pub(super) fn matched_views(&self) -> Vec<ViewIndex> {
+        self.views().filter(|v| !self.neighbors[v.index()].matching().is_empty()).collect()
+    }
+}
+
+/// Loads the scene, replaces what the job replaces, and finds the region of interest.
+///
+/// # Errors
+/// Unreadable files.
+pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
+    let start = Instant::now();
+    let mut loaded = load_scene(&job.scene, &job.working_folder, &Limits::default())?;
+    if let Some(path) = &job.pointcloud_file {
+        replace_points(&mut loaded, path)?;
+    }
+    let scene = &mut loaded.scene;
+    progress.event(Event::SceneLoaded {
+        images: scene.views.len(),
+        calibrated: scene.views.iter().filter(|v| v.calibration.is_some()).count(),
+        points: scene.tracks.len(),
+        elapsed: start.elapsed(),
+    });
+    if scene.roi.is_none() {
+        scene.roi = estimate_roi(scene, job.roi.estimate);
+    }
+    if let Some(path) = &job.view_neighbors_file {
+        override_from_file(scene, path)?;
+    }
+    Ok(loaded)
+}
+
+/// Decodes the images, checks labels, and finds neighbours. `cameras` come from the images' headers; images whose
+/// pixels turn out to be unusable are left out too, unless the job is strict.
+///
+/// # Errors
+/// Fewer than two usable views, faulty labels, no way to find neighbours.
+pub(super) fn prepare(
+    job: &SceneJob,
+    loaded: LoadedScene,
+    mut cameras: Vec<Option<Camera>>,
+    decode: bool,
+    progress: &Progress,
+) -> Result<Prepared> {
+    let start = Instant::now();
+    let images = Images::new(&loaded);
+    let mut dropped = header_drops(&loaded, &cameras);
+    if decode {
+        for (view, error) in images.check(&cameras, progress) {
+            if job.strict {
+                return Err(error);
+            }
+            progress.warn(format!("{error}; view {} is left out", view.0));
+            cameras[view.index()] = None;
+            dropped[view.index()] = Some(error.to_string());
+        }
+    }
+    let usable = cameras.iter().flatten().count();
+    if usable < 2 {
+        let what = format!(
+            "{usable} of its {} images can be used: at least two with a pose and a readable file are needed",
+            cameras.len()
+        );
+        return Err(Error::content(&loaded.path, what));
+    }
+    progress.event(Event::ImagesPrepared { images: usable, elapsed: start.elapsed() });
+    let masks = job.masks.as_ref().map(|m| Masks::find(m, &loaded, &cameras, progress)).transpose()?;
+    let labels = job.labels.as_ref().map(|l| Labels::open(l, &loaded, &cameras, progress)).transpose()?;
+    let neighbors = select_neighbors(&loaded.scene, &cameras, &job.neighbors)?;
+    let prepared = Prepared { loaded, cameras, dropped, neighbors, images, masks, labels };
+    report_pairs(&prepared, start, progress)?;
+    Ok(prepared)
+}
+
+/// Why calibrated views have no camera.
+fn header_drops(loaded: &LoadedScene, cameras: &[Option<Camera>]) -> Vec<Option<String>> {
+    loaded
+        .scene
+        .views
+        .iter()
+        .zip(cameras)
+        .map(|(view, camera)| match (&view.calibration, camera) {
+            (None, _) => Some("no pose".to_owned()),
+            (Some(_), None) => Some(format!("{}: the image cannot be used", view.name)),
+            _ => None,
+        })
+        .collect()
+}
+
+fn report_pairs(prepared: &Prepared, start: Instant, progress: &Progress) -> Result<()> {
+    let matched = prepared.matched_views();
+    if matched.is_empty() {
+        return Err(Error::content(
+            &prepared.loaded.path,
+            "no image has a neighbour to be matched with: the images share too few sparse points, or all pairs see \
+             them at too small an angle",
+        ));
+    }
+    for &view in &matched {
+        let sources = prepared.neighbors[view.index()].matching();
+        progress.event(Event::Paired {
+            reference: prepared.id(view),
+            sources: sources.iter().map(|n| prepared.id(n.view)).collect(),
+        });
+    }
+    progress.event(Event::ViewsSelected { images: matched.len(), elapsed: start.elapsed() });
+    Ok(())
+}

@@ -1,0 +1,104 @@
+//! What a run did, for its report.
+
+use super::filter::valid_depths;
+use super::prepare::Prepared;
+use crate::error::{Error, Result};
+use crate::report::{RunReport, StageTime, ViewReport};
+use crate::scene::ViewIndex;
+use crate::store::depth_store::DepthStore;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+/// Measures the stages of a run.
+pub(super) struct Clock {
+    start: Instant,
+    stage: Instant,
+    stages: Vec<StageTime>,
+}
+
+impl Clock {
+    /// Starts now.
+    pub(super) fn start() -> Self {
+        let now = Instant::now();
+        Clock { start: now, stage: now, stages: Vec::new() }
+    }
+
+    /// The stage that ends now.
+    pub(super) fn stage(&mut self, name: &str) {
+        let now = Instant::now();
+        let seconds = (now - self.stage).as_secs_f64();
+        self.stages.push(StageTime { stage: name.to_owned(), seconds, cpu_seconds: None });
+        self.stage = now;
+    }
+
+    /// Time since the start.
+    pub(super) fn elapsed(&self) -> std::time::Duration {
+        self.start.elapsed()
+    }
+
+    /// Puts the times into a report.
+    pub(super) fn finish(self, report: &mut RunReport) {
+        report.seconds = self.start.elapsed().as_secs_f64();
+        report.stages = self.stages;
+    }
+}
+
+/// One row per view of the scene; `mapped` ones have depth maps, of which `reused` were there before.
+///
+/// # Errors
+/// A depth map cannot be read.
+pub(super) fn view_rows(
+    prepared: &Prepared,
+    store: &DepthStore,
+    mapped: &[ViewIndex],
+    reused: &BTreeSet<ViewIndex>,
+) -> Result<Vec<ViewReport>> {
+    let views = &prepared.loaded.scene.views;
+    (0..views.len())
+        .into_par_iter()
+        .map(|i| {
+            let view = ViewIndex(i as u32);
+            let mut row = ViewReport {
+                index: view.0,
+                id: views[i].id.0,
+                image: views[i].name.clone(),
+                sources: prepared.neighbors[i].matching().iter().map(|n| prepared.id(n.view).0).collect(),
+                reused: reused.contains(&view),
+                labels: prepared
+                    .labels
+                    .as_ref()
+                    .and_then(|labels| labels.file(view))
+                    .map(|path| path.display().to_string()),
+                dropped: prepared.dropped[i].clone(),
+                ..ViewReport::default()
+            };
+            if mapped.binary_search(&view).is_ok() {
+                let map = store.read(views[i].id)?;
+                let size = map.depth.size();
+                let valid = valid_depths(&map.depth);
+                (row.width, row.height) = (size.width, size.height);
+                row.depth_range = [map.depth_range.0, map.depth_range.1];
+                row.valid_depths = valid as u64;
+                row.coverage = valid as f64 / size.area().max(1) as f64;
+                row.mean_confidence = map.confidence.as_ref().filter(|_| valid > 0).map(|confidence| {
+                    let pairs = confidence.data().iter().zip(map.depth.data());
+                    pairs.filter(|(_, d)| **d > 0.0).map(|(c, _)| f64::from(*c)).sum::<f64>() / valid as f64
+                });
+            }
+            Ok(row)
+        })
+        .collect()
+}
+
+/// Runs `work` on a pool of `threads` threads; 0 = as many as the machine has.
+///
+/// # Errors
+/// Those of `work`; the threads cannot be started.
+pub(super) fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Error::invalid(format!("--max-threads {threads}: cannot start the threads: {e}")))?;
+    pool.install(work)
+}
