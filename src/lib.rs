@@ -3,6 +3,7 @@
 //! The layout and the flow of data are described in `docs/ARCHITECTURE.md`.
 #![deny(unsafe_code)]
 
+pub mod cli;
 pub mod depth_filter;
 mod error;
 pub mod evaluate;

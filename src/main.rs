@@ -1,3 +1,7 @@
 //! The program `semvs`.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    semvs::cli::semvs(std::env::args_os())
+}

@@ -1,8 +1,7 @@
 //! The options of `DensifyPointCloud` beyond the shared ones, as typed, and the order in which help lists all.
 
 use super::tokens::Known;
-use crate::cli::label_options::LabelOptions;
-use crate::cli::options::{EstimationOptions, FusionOptions, ImageOptions, RoiOptions, RunOptions};
+use crate::cli::options::SharedOptions;
 use clap::{ArgAction, CommandFactory, Parser};
 use std::path::PathBuf;
 
@@ -37,17 +36,7 @@ pub(crate) struct DropInArgs {
     #[command(flatten)]
     pub(crate) actions: Actions,
     #[command(flatten)]
-    pub(crate) run: RunOptions,
-    #[command(flatten)]
-    pub(crate) images: ImageOptions,
-    #[command(flatten)]
-    pub(crate) estimation: EstimationOptions,
-    #[command(flatten)]
-    pub(crate) fusion: FusionOptions,
-    #[command(flatten)]
-    pub(crate) roi: RoiOptions,
-    #[command(flatten)]
-    pub(crate) labels: LabelOptions,
+    pub(crate) shared: SharedOptions,
 }
 
 /// Jobs other than densification that OpenMVS's program can do.
@@ -134,6 +123,7 @@ pub(crate) const DENSIFY: &[&str] = &[
 ];
 
 /// Options that OpenMVS's help does not list.
+#[cfg(test)]
 pub(crate) const HIDDEN: &[&str] =
     &["mesh-file", "export-roi-file", "import-roi-file", "dense-config-file", "export-depth-maps-name"];
 

@@ -42,11 +42,15 @@ pub(crate) fn split(args: &[OsString], known: &[Known], positional: &str) -> Res
         };
         let value = match (option.takes_value, attached) {
             (false, None) => None,
-            (false, Some(_)) => return Err(format!("option '--{}' does not take any arguments", option.long)),
+            (false, Some(_)) => {
+                return Err(format!("option '--{}' does not take any arguments", option.long));
+            }
             (true, Some(value)) => Some(value),
             (true, None) => match rest.next_if(|next| !is_option(next, known)) {
                 Some(value) => Some(value.clone()),
-                None => return Err(format!("the required argument for option '--{}' is missing", option.long)),
+                None => {
+                    return Err(format!("the required argument for option '--{}' is missing", option.long));
+                }
             },
         };
         typed.push((option.long.clone(), value));
@@ -98,7 +102,10 @@ fn long_option<'a>(
         None => Ok((find(name, known)?, None)),
         Some((name, "")) => {
             let option = find(name, known)?;
-            Err(format!("the argument for option '--{}' should follow immediately after the equal sign", option.long))
+            Err(format!(
+                "the argument for option '--{}' should follow immediately after the equal sign",
+                option.long
+            ))
         }
         Some((name, _)) => Ok((find(name, known)?, Some(after(arg, "--".len() + name.len() + 1)?))),
     }
@@ -247,7 +254,10 @@ mod tests {
     fn mistakes_name_the_option() {
         assert_eq!(parse(&["--nope", "1"]).unwrap_err(), "unrecognised option '--nope'");
         assert_eq!(parse(&["-z"]).unwrap_err(), "unrecognised option '-z'");
-        assert_eq!(parse(&["-w"]).unwrap_err(), "the required argument for option '--working-folder' is missing");
+        assert_eq!(
+            parse(&["-w"]).unwrap_err(),
+            "the required argument for option '--working-folder' is missing"
+        );
         assert_eq!(
             parse(&["--fusion-mode", "--number-views", "2"]).unwrap_err(),
             "the required argument for option '--fusion-mode' is missing"

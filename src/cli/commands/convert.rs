@@ -1,0 +1,29 @@
+//! `semvs convert`.
+
+use super::{cloud_path, conclude};
+use crate::cli::resolve;
+use crate::cli::semvs_args::ConvertArgs;
+use crate::error::Result;
+use crate::pipeline::{self, ConvertJob, Outputs};
+use crate::progress::Progress;
+use std::path::Path;
+
+/// Runs the command.
+pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
+    let as_typed = |path: &Path| path.to_owned();
+    let job = ConvertJob {
+        depth_maps: args.depth_maps.clone(),
+        working_folder: args.working_folder.clone(),
+        labels: resolve::labels(&args.labels, &as_typed)?,
+        outputs: Outputs {
+            cloud: cloud_path(&args.output)?,
+            scene: None,
+            layout: resolve::typed_layout(args.ply_layout),
+            split_by_class: args.split_by_class,
+            color_by_label: args.color_by_label,
+            report: None,
+            sparse_cloud: false,
+        },
+    };
+    conclude(&pipeline::convert(&job, progress)?, None)
+}

@@ -1,0 +1,91 @@
+//! `semvs inspect`.
+
+use crate::cli::semvs_args::InspectArgs;
+use crate::error::{Error, Result};
+use crate::pipeline;
+use serde_json::Value;
+use std::fmt::Write;
+
+/// Runs the command.
+pub(crate) fn inspect(args: &InspectArgs) -> Result<()> {
+    let inspection = pipeline::inspect::inspect(&args.file)?;
+    let no_json = |e| Error::invalid(format!("no JSON: {e}"));
+    let text = match args.json {
+        true => serde_json::to_string_pretty(&inspection).map_err(no_json)? + "\n",
+        false => text(&serde_json::to_value(&inspection).map_err(no_json)?),
+    };
+    crate::cli::print(&text);
+    Ok(())
+}
+
+/// Rows of a list of records that are shown.
+const MAX_ROWS: usize = 50;
+
+/// One line per fact; lists of records get a line per record.
+fn text(facts: &Value) -> String {
+    let mut out = String::new();
+    for (name, value) in facts.as_object().into_iter().flatten() {
+        let name = name.replace('_', " ");
+        match value {
+            Value::Array(rows) if rows.iter().any(Value::is_object) => {
+                let _ = writeln!(out, "{name}: {}", rows.len());
+                for row in rows.iter().take(MAX_ROWS) {
+                    let _ = writeln!(out, "  {}", inline(row));
+                }
+                if rows.len() > MAX_ROWS {
+                    let _ = writeln!(out, "  ... and {} more (--json shows all)", rows.len() - MAX_ROWS);
+                }
+            }
+            Value::Object(fields) => {
+                let _ = writeln!(out, "{name}:");
+                for (key, value) in fields {
+                    let _ = writeln!(out, "  {}: {}", key.replace('_', " "), inline(value));
+                }
+            }
+            value => {
+                let _ = writeln!(out, "{name}: {}", inline(value));
+            }
+        }
+    }
+    out
+}
+
+fn inline(value: &Value) -> String {
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Number(number) => match number.as_f64() {
+            Some(v) if number.is_f64() => format!("{}", (v * 1e6).round() / 1e6),
+            _ => number.to_string(),
+        },
+        Value::Array(items) => items.iter().map(inline).collect::<Vec<_>>().join(" "),
+        Value::Object(fields) => {
+            let field =
+                |(key, value): (&String, &Value)| format!("{} {}", key.replace('_', " "), inline(value));
+            fields.iter().map(field).collect::<Vec<_>>().join(", ")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn facts_become_lines() {
+        let facts = serde_json::json!({
+            "kind": "cloud",
+            "points": 2,
+            "bounds": {"min": [0.0, 1.0], "max": [2.5, 3.0]},
+            "colors": true,
+            "images": [{"id": 1, "name": "a"}, {"id": 2, "name": "b"}],
+            "views": null,
+        });
+        let text = text(&facts);
+        for line in ["points: 2", "  max: 2.5 3", "colors: yes", "images: 2", "  id 1, name a", "views: none"]
+        {
+            assert!(text.lines().any(|l| l == line), "{line}\n{text}");
+        }
+    }
+}

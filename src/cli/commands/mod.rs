@@ -1,0 +1,91 @@
+//! The commands of `semvs`: from typed options to a job, and from its outcome to text.
+
+mod convert;
+mod densify;
+mod evaluate;
+mod fuse;
+mod inspect;
+
+pub(crate) use convert::convert;
+pub(crate) use densify::densify;
+pub(crate) use evaluate::evaluate;
+pub(crate) use fuse::fuse;
+pub(crate) use inspect::inspect;
+
+use crate::error::{Error, Result};
+use crate::pipeline::DEPTH_MAP;
+use crate::report::{OutputReport, RunReport};
+use crate::store::atomic::write_file;
+use clap::ArgMatches;
+use clap::parser::ValueSource;
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// The cloud that `-o` names: `.ply` is added to a name without extension.
+fn cloud_path(typed: &Path) -> Result<PathBuf> {
+    match typed.extension() {
+        _ if typed.file_name().is_none() => Err(Error::content(typed, "--output: give a file name")),
+        None => Ok(typed.with_extension("ply")),
+        Some(extension) if extension.eq_ignore_ascii_case("ply") => Ok(typed.to_owned()),
+        Some(_) => Err(Error::content(typed, "--output: clouds are written as .ply; end the name so")),
+    }
+}
+
+/// The cloud of a scene when `-o` is not given: `SCENE_dense.ply` beside it.
+fn default_cloud(scene: &Path) -> PathBuf {
+    crate::cli::values::with_suffix(&scene.with_extension(""), "_dense.ply")
+}
+
+/// Whether an option was typed, by its long name.
+fn is_typed(matches: &ArgMatches, long: &str) -> bool {
+    matches.value_source(&long.replace('-', "_")) == Some(ValueSource::CommandLine)
+}
+
+/// Every option in effect, typed or by default, under its long name.
+pub(crate) fn options_in_effect(matches: &ArgMatches) -> Map<String, Value> {
+    let mut options = Map::new();
+    for id in matches.ids() {
+        let Ok(Some(values)) = matches.try_get_raw(id.as_str()) else { continue };
+        let values: Vec<String> = values.map(|v| v.to_string_lossy().into_owned()).collect();
+        options.insert(id.as_str().replace('_', "-"), Value::String(values.join(",")));
+    }
+    options
+}
+
+/// Prints the summary and writes the report.
+pub(crate) fn conclude(report: &RunReport, path: Option<&Path>) -> Result<()> {
+    if let Some(path) = path {
+        let text = report.to_json().map_err(|e| Error::content(path, format!("no JSON: {e}")))?;
+        write_file(path, text.as_bytes())?;
+    }
+    crate::cli::print(&with_maps_in_one_row(report).summary());
+    Ok(())
+}
+
+/// The report with one row for all depth maps.
+fn with_maps_in_one_row(report: &RunReport) -> RunReport {
+    let mut short = report.clone();
+    let maps: Vec<&OutputReport> = report.outputs.iter().filter(|o| o.content == DEPTH_MAP).collect();
+    short.outputs.retain(|o| o.content != DEPTH_MAP);
+    if let Some(folder) = maps.first().and_then(|map| Path::new(&map.path).parent()) {
+        short.outputs.push(OutputReport {
+            path: folder.join("depth*.dmap").display().to_string(),
+            content: format!("{} depth maps", maps.len()),
+            points: None,
+        });
+    }
+    short
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clouds_end_in_ply() {
+        assert_eq!(cloud_path(Path::new("a/b")).unwrap(), Path::new("a/b.ply"));
+        assert_eq!(cloud_path(Path::new("b.PLY")).unwrap(), Path::new("b.PLY"));
+        assert!(cloud_path(Path::new("b.las")).unwrap_err().to_string().contains(".ply"));
+        assert_eq!(default_cloud(Path::new("x/scene.mvs")), Path::new("x/scene_dense.ply"));
+    }
+}

@@ -1,0 +1,185 @@
+//! What `semvs` says on stderr while it works: lines, and bars on a terminal.
+
+use super::duration;
+use crate::progress::{Event, Listener, Stage};
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use std::io::{IsTerminal, Write};
+use std::sync::Mutex;
+
+/// How much is said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Level {
+    /// Errors alone, which the program itself prints.
+    Errors,
+    /// And warnings.
+    Warnings,
+    /// And what happens.
+    Info,
+    /// And what happens to every view.
+    Detail,
+    /// Everything.
+    All,
+}
+
+impl Level {
+    /// Level for `-v` given `verbose` times and `-q` given `quiet` times.
+    pub(crate) fn of(verbose: u8, quiet: u8) -> Level {
+        match (verbose, quiet) {
+            (_, 2..) => Level::Errors,
+            (_, 1) => Level::Warnings,
+            (0, 0) => Level::Info,
+            (1, 0) => Level::Detail,
+            _ => Level::All,
+        }
+    }
+}
+
+/// Turns what work reports into log lines and bars.
+pub(crate) struct Console {
+    level: Level,
+    bars: MultiProgress,
+    /// Bars are drawn; otherwise every tenth of a stage gets a line.
+    draw: bool,
+    current: Mutex<Option<(Stage, ProgressBar)>>,
+}
+
+impl Console {
+    /// Says what `level` asks for; bars are for terminals.
+    pub(crate) fn new(level: Level) -> Self {
+        let draw = std::io::stderr().is_terminal() && level >= Level::Info;
+        Console { level, bars: MultiProgress::new(), draw, current: Mutex::new(None) }
+    }
+
+    fn say(&self, level: Level, text: &str) {
+        if level <= self.level {
+            // A closed pipe must not stop the work.
+            self.bars.suspend(|| {
+                let _ = writeln!(std::io::stderr(), "{text}");
+            });
+        }
+    }
+
+    fn draw_steps(&self, stage: Stage, done: usize, total: usize) {
+        let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if current.as_ref().is_none_or(|(shown, _)| *shown != stage) {
+            let bar = self.bars.add(ProgressBar::new(total as u64));
+            if let Ok(style) =
+                ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {elapsed}, {eta} left")
+            {
+                bar.set_style(style);
+            }
+            bar.set_message(name(stage));
+            *current = Some((stage, bar));
+        }
+        if let Some((_, bar)) = current.as_ref() {
+            // Threads may report out of order.
+            bar.set_position(bar.position().max(done as u64));
+            if done == total {
+                bar.finish_and_clear();
+                self.bars.remove(bar);
+            }
+        }
+        if done == total {
+            *current = None;
+        }
+    }
+}
+
+/// Whether step `done` of `total` is the first of a new tenth.
+fn begins_a_tenth(done: usize, total: usize) -> bool {
+    done > 0 && total > 0 && done * 10 / total > (done - 1) * 10 / total
+}
+
+fn name(stage: Stage) -> String {
+    match stage {
+        Stage::PrepareImages => "Preparing images".into(),
+        Stage::CheckLabels => "Checking label maps".into(),
+        Stage::Estimate => "Estimating depth maps".into(),
+        Stage::Geometric { pass, passes } => format!("Geometric pass {} of {passes}", pass + 1),
+        Stage::Filter => "Filtering depth maps".into(),
+        Stage::Fuse => "Fusing depth maps".into(),
+        Stage::Merge => "Merging depth maps".into(),
+    }
+}
+
+impl Listener for Console {
+    fn event(&self, event: &Event) {
+        match event {
+            Event::Warning(text) => self.say(Level::Warnings, &format!("warning: {text}")),
+            Event::Detail(_) | Event::DepthEstimated { .. } | Event::DepthFiltered { .. } => {
+                self.say(Level::Detail, &line(event));
+            }
+            Event::Paired { .. } => self.say(Level::All, &line(event)),
+            _ => self.say(Level::Info, &line(event)),
+        }
+    }
+
+    fn steps(&self, stage: Stage, done: usize, total: usize) {
+        if self.draw {
+            self.draw_steps(stage, done, total);
+        } else if begins_a_tenth(done, total) {
+            self.say(Level::Info, &format!("{}: {done} of {total}", name(stage)));
+        }
+    }
+}
+
+fn line(event: &Event) -> String {
+    let time = |elapsed: &std::time::Duration| duration::text(*elapsed);
+    match event {
+        Event::Warning(text) | Event::Info(text) | Event::Detail(text) => text.clone(),
+        Event::SceneLoaded { images, calibrated, points, elapsed } => {
+            format!(
+                "Scene read: {images} images ({calibrated} with a pose), {points} points ({})",
+                time(elapsed)
+            )
+        }
+        Event::ImagesPrepared { images, elapsed } => format!("Images ready: {images} ({})", time(elapsed)),
+        Event::ViewsSelected { images, .. } => format!("Images with neighbours: {images}"),
+        Event::Paired { reference, sources } => {
+            let sources: Vec<String> = sources.iter().map(ToString::to_string).collect();
+            format!("Image {reference} is matched with {}", sources.join(" "))
+        }
+        Event::DepthEstimated { reference, sources, size, elapsed } => format!(
+            "Depth map {reference}: {}×{} from {sources} neighbours ({})",
+            size.0,
+            size.1,
+            time(elapsed)
+        ),
+        Event::DepthFiltered { reference, sources, discarded, processed, elapsed } => format!(
+            "Depth map {reference} held against {sources} others: {discarded} of {processed} depths removed ({})",
+            time(elapsed)
+        ),
+        Event::Fused { maps, depths, points, elapsed } => {
+            format!("Fused {maps} depth maps: {depths} depths, {points} points ({})", time(elapsed))
+        }
+        Event::DepthMapsCompleted { maps, elapsed, .. } => {
+            format!("Depth maps done: {maps} ({})", time(elapsed))
+        }
+        Event::Densified { points, elapsed } => format!("Dense cloud: {points} points ({})", time(elapsed)),
+        Event::CloudSaved { path, points, .. } => format!("Wrote {}: {points} points", path.display()),
+        Event::SceneSaved { path, .. } => format!("Wrote {}", path.display()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plain_output_has_ten_lines_per_stage_at_most() {
+        for total in [1, 7, 10, 11, 1000] {
+            let lines = (0..=total).filter(|&done| begins_a_tenth(done, total)).count();
+            assert!(lines == total.min(10), "{total}: {lines}");
+            assert!(begins_a_tenth(total, total));
+        }
+    }
+
+    #[test]
+    fn verbosity_levels() {
+        assert_eq!(Level::of(0, 0), Level::Info);
+        assert_eq!(Level::of(1, 0), Level::Detail);
+        assert_eq!(Level::of(3, 0), Level::All);
+        assert_eq!(Level::of(0, 1), Level::Warnings);
+        assert_eq!(Level::of(0, 2), Level::Errors);
+    }
+}

@@ -1,0 +1,12 @@
+//! The program `DensifyPointCloud`: OpenMVS's command line before this library's pipeline.
+
+mod args;
+mod config_file;
+mod front;
+mod help;
+mod log;
+mod refusals;
+mod run;
+mod tokens;
+
+pub use run::densify_point_cloud;

@@ -1,0 +1,156 @@
+//! One run of `DensifyPointCloud`, from the command line to the exit code.
+
+use super::front::{self, Typing};
+use super::log::Log;
+use super::{help, refusals};
+use crate::cli::duration::Moment;
+use crate::cli::listen::Recorder;
+use crate::cli::resolve::{self, Resolver};
+use crate::cli::values::{openmvs_path, under, with_suffix};
+use crate::error::{Error, Result};
+use crate::pipeline::{self, DensifyJob, Outputs};
+use crate::progress::Progress;
+use crate::report::{RunReport, class_table};
+use crate::store::atomic::{create_folder, write_file};
+use crate::store::cloud::PlyLayout;
+use std::ffi::OsString;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+/// Runs `DensifyPointCloud` with the words of its command line, the program's name left out. Lines go to stdout and
+/// to a log file in the working folder; an error goes to stderr too unless stdout is a terminal. Every failure is
+/// exit code 1.
+pub fn densify_point_cloud(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let typing = match front::read(&words) {
+        Ok(typing) => typing,
+        Err(error) => return fail(None, &error),
+    };
+    let folder = typing.args.shared.run.working_folder.as_deref().map(openmvs_path).unwrap_or_default();
+    let here = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
+    let log = create_folder(here).and_then(|()| Log::create(here, typing.args.verbosity));
+    let log = match log {
+        Ok(log) => Arc::new(log),
+        Err(error) => return fail(None, &error.to_string()),
+    };
+    log.line(0, &format!("semvs {}, DensifyPointCloud as of OpenMVS 2.3.0", env!("CARGO_PKG_VERSION")));
+    let typed: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
+    log.line(0, &format!("Command line: DensifyPointCloud {}", typed.join(" ")));
+    if typing.args.help {
+        crate::cli::print(&help::text());
+        if typing.args.input_file.is_none() {
+            return ExitCode::FAILURE;
+        }
+    }
+    let recorder = Recorder::start(log.clone());
+    match run(&typing, &folder, &log, &recorder) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(Some(&log), &error.to_string()),
+    }
+}
+
+/// Says what went wrong.
+fn fail(log: Option<&Log>, error: &str) -> ExitCode {
+    match log {
+        Some(log) => log.error(error),
+        None => crate::cli::print(&format!("{} [App     ] error: {error}\n", Moment::now().clock())),
+    }
+    if !std::io::stdout().is_terminal() {
+        crate::cli::complain(&format!("error: {error}\n"));
+    }
+    ExitCode::FAILURE
+}
+
+fn run(typing: &Typing, folder: &Path, log: &Log, recorder: &Arc<Recorder>) -> Result<()> {
+    let args = &typing.args;
+    let Some(input) = &args.input_file else {
+        return Err(Error::invalid("no input file: give the scene, DensifyPointCloud SCENE.mvs; see --help"));
+    };
+    refusals::check(args).map_err(Error::Invalid)?;
+    let input = front::resolve(folder, input);
+    let place = |path: &Path| front::resolve_existing(folder, path);
+    let resolver = Resolver::new(&args.shared, &place)?;
+    let progress = recorder.progress();
+    resolver.remarks.iter().for_each(|remark| progress.warn(remark.as_str()));
+    let job = job(typing, folder, input, &resolver)?;
+    if act(typing, folder, &job, &progress)? {
+        return Ok(());
+    }
+    let mut report = pipeline::densify(&job, resolve::cpu()?, &progress)?;
+    report.warnings = recorder.warnings();
+    conclude(report, &job, typing, log)
+}
+
+/// Does the first of the small jobs that were asked for, in OpenMVS's order; `false`: densify.
+fn act(typing: &Typing, folder: &Path, job: &DensifyJob, progress: &Progress) -> Result<bool> {
+    let actions = &typing.args.actions;
+    let place = |typed: &Option<PathBuf>| typed.as_deref().map(|path| front::resolve(folder, path));
+    if let (Some(region), Some(scene)) = (place(&actions.import_roi_file), &job.outputs.scene) {
+        pipeline::import_roi(&job.input, &region, scene, progress)?;
+        return Ok(true);
+    }
+    if let Some(path) = place(&actions.export_roi_file) {
+        if pipeline::export_roi(&job.input, &path, progress)? {
+            return Ok(true);
+        }
+        progress.warn(format!("{}: not written, the scene has no region of interest", path.display()));
+    }
+    if let Some(path) = place(&actions.output_view_neighbors_file) {
+        pipeline::export_neighbors(&job.input, &path, progress)?;
+        return Ok(true);
+    }
+    Ok(false)
+}
+
+fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) -> Result<DensifyJob> {
+    let args = &typing.args;
+    let shared = &args.shared;
+    let base = match &args.output_file {
+        Some(output) => front::resolve(folder, output).with_extension(""),
+        None => with_suffix(&input.with_extension(""), "_dense"),
+    };
+    if base.file_name().is_none() {
+        return Err(Error::content(&base, "--output-file: give a file name"));
+    }
+    let mut scene = resolver.scene(input, folder.to_owned())?;
+    if let Some(masks) = &mut scene.masks {
+        // Unlike all others this path is relative to the current folder.
+        masks.folder = shared.images.mask_path.as_deref().map(openmvs_path);
+    }
+    let outputs = &shared.labels.output;
+    Ok(DensifyJob {
+        input: scene,
+        resolution: resolver.resolution()?,
+        depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() },
+        stereo: resolver.stereo()?,
+        filter: resolver.filter(typing.has("postprocess-dmaps"))?,
+        depth_maps_only: shared.estimation.fusion_mode == 1,
+        remove_depth_maps: shared.fusion.remove_dmaps,
+        fusion: resolver.fusion()?,
+        outputs: Outputs {
+            cloud: with_suffix(&base, ".ply"),
+            scene: Some(with_suffix(&base, ".mvs")),
+            layout: resolve::layout(outputs, PlyLayout::OpenMvs),
+            split_by_class: outputs.split_by_class,
+            color_by_label: outputs.color_by_label,
+            report: outputs.report.as_deref().map(|path| under(folder, &openmvs_path(path))),
+            sparse_cloud: true,
+        },
+    })
+}
+
+fn conclude(mut report: RunReport, job: &DensifyJob, typing: &Typing, log: &Log) -> Result<()> {
+    if !report.classes.is_empty() {
+        class_table(&report.classes).lines().for_each(|line| log.line(0, line));
+    }
+    if let Some(path) = &job.outputs.report {
+        report.program = "DensifyPointCloud".to_owned();
+        report.version = env!("CARGO_PKG_VERSION").to_owned();
+        report.options = typing.options.clone();
+        let text = report.to_json().map_err(|e| Error::content(path, format!("no JSON: {e}")))?;
+        write_file(path, text.as_bytes())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,32 @@
+//! The programs: what is typed, what it means, what is said meanwhile.
+
+mod commands;
+mod console;
+mod dense_config;
+mod densify_point_cloud;
+mod duration;
+mod label_options;
+mod listen;
+mod one_line;
+mod options;
+mod resolve;
+mod semvs;
+mod semvs_args;
+mod values;
+
+pub use densify_point_cloud::densify_point_cloud;
+pub use semvs::semvs;
+
+use std::io::Write;
+
+/// To stdout; a closed pipe is no failure.
+fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+/// To stderr; a closed pipe is no failure.
+fn complain(text: &str) {
+    let mut err = std::io::stderr().lock();
+    let _ = err.write_all(text.as_bytes());
+}

@@ -1,0 +1,274 @@
+//! From options as typed to jobs whose values are checked.
+
+use super::dense_config::{self, DenseConfig};
+use super::label_options::{ConsistencyMode, LabelInput, LabelOutput, PlyLayout as TypedLayout, WhenMissing};
+use super::options::SharedOptions;
+use crate::depth_filter::DepthFilterOptions;
+use crate::error::{Error, Result};
+use crate::fusion::{AttributeSource, FusionOptions};
+use crate::pipeline::{FilterJob, LabelJob, MaskJob, RoiJob, SceneJob};
+use crate::scene::{NeighborOptions, OutsideRoi, ResolutionOptions, RoiEstimation};
+use crate::semantics::{ClassRules, Consistency};
+use crate::stereo::{CpuLevel, StereoOptions};
+use crate::store::cloud::PlyLayout;
+use crate::store::labels::{LabelSources, MissingLabels, UnknownLabel};
+use std::path::{Path, PathBuf};
+
+/// What the options say, paths resolved by `place`.
+pub(crate) struct Resolver<'a> {
+    options: &'a SharedOptions,
+    config: DenseConfig,
+    /// Remarks about the dense config file.
+    pub(crate) remarks: Vec<String>,
+    /// Makes a typed path a usable one.
+    place: &'a dyn Fn(&Path) -> PathBuf,
+}
+
+impl<'a> Resolver<'a> {
+    /// Reads the dense config file, if there is one.
+    ///
+    /// # Errors
+    /// As [`dense_config::load`].
+    pub(crate) fn new(options: &'a SharedOptions, place: &'a dyn Fn(&Path) -> PathBuf) -> Result<Self> {
+        let file = options.estimation.dense_config_file.as_deref().map(place);
+        let (config, remarks) = match &file {
+            Some(path) => dense_config::load(path)?,
+            None => Default::default(),
+        };
+        let named = |remark| format!("{}: {remark}", file.as_deref().unwrap_or(Path::new("")).display());
+        let remarks = remarks.into_iter().map(named).collect();
+        Ok(Resolver { options, config, remarks, place })
+    }
+
+    /// The scene at `scene` (a usable path).
+    ///
+    /// # Errors
+    /// A value out of range; options that need labels without labels.
+    pub(crate) fn scene(&self, scene: PathBuf, working_folder: PathBuf) -> Result<SceneJob> {
+        let images = &self.options.images;
+        let path = |typed: &Option<PathBuf>| typed.as_deref().map(self.place);
+        Ok(SceneJob {
+            scene,
+            working_folder,
+            pointcloud_file: path(&images.pointcloud_file),
+            view_neighbors_file: path(&images.view_neighbors_file),
+            neighbors: self.neighbors()?,
+            roi: self.roi()?,
+            masks: masks(images.ignore_mask_label, images.mask_path.clone())?,
+            labels: labels(&self.options.labels.input, self.place)?,
+            strict: self.options.run.strict,
+            max_threads: self.options.run.max_threads as usize,
+        })
+    }
+
+    fn neighbors(&self) -> Result<NeighborOptions> {
+        let config = &self.config;
+        let options = NeighborOptions {
+            number_views: self.options.images.number_views as usize,
+            min_views: config.min_views as usize,
+            max_views: config.max_views as usize,
+            min_views_trust_point: config.min_views_trust_point as usize,
+            outside_roi: match config.point_inside_roi {
+                0 => OutsideRoi::Count,
+                1 => OutsideRoi::Discount,
+                2 => OutsideRoi::Drop,
+                other => {
+                    return Err(Error::invalid(format!("'Point Inside ROI' is {other}, expected 0, 1 or 2")));
+                }
+            },
+            min_score: config.view_min_score,
+            min_score_ratio: config.view_min_score_ratio,
+            min_area: config.min_area,
+            min_angle_deg: config.min_angle_deg,
+            best_angle_deg: config.optim_angle_deg,
+            max_angle_deg: config.max_angle_deg,
+        };
+        options.check()?;
+        Ok(options)
+    }
+
+    fn roi(&self) -> Result<RoiJob> {
+        let typed = &self.options.roi;
+        let estimate = match typed.estimate_roi {
+            0 => RoiEstimation::Off,
+            1 => RoiEstimation::Always,
+            2 => RoiEstimation::ObjectScan,
+            other => {
+                return Err(Error::invalid(format!("--estimate-roi {other}: give 0 (no), 1 (always) or 2")));
+            }
+        };
+        Ok(RoiJob { estimate, border: typed.roi_border, crop: typed.crop_to_roi })
+    }
+
+    /// Size at which images are matched.
+    ///
+    /// # Errors
+    /// Values out of range.
+    pub(crate) fn resolution(&self) -> Result<ResolutionOptions> {
+        let images = &self.options.images;
+        let options = ResolutionOptions {
+            level: images.resolution_level,
+            min: images.min_resolution,
+            max: images.max_resolution,
+        };
+        options.check()?;
+        Ok(options)
+    }
+
+    /// Estimation.
+    ///
+    /// # Errors
+    /// Values out of range.
+    pub(crate) fn stereo(&self) -> Result<StereoOptions> {
+        let typed = &self.options.estimation;
+        let own = StereoOptions::default();
+        let (config, openmvs) = (&self.config, DenseConfig::default());
+        // OpenMVS's defaults are those of its estimator; a file that repeats them asks for nothing.
+        let asked = |value: f32, default: f32, own: f32| if value == default { own } else { value };
+        let options = StereoOptions {
+            levels: typed.sub_resolution_levels,
+            iterations: typed.iters,
+            geometric_iterations: typed.geometric_iters,
+            keep_cost: asked(config.ncc_threshold_keep, openmvs.ncc_threshold_keep, own.keep_cost),
+            geometric_weight: asked(config.geometric_weight, openmvs.geometric_weight, own.geometric_weight),
+            ..own
+        };
+        options.check()?;
+        Ok(options)
+    }
+
+    /// Cleaning; "Optimize" of the dense config file counts when `bits_are_typed` is false.
+    ///
+    /// # Errors
+    /// Values out of range.
+    pub(crate) fn filter(&self, bits_are_typed: bool) -> Result<FilterJob> {
+        let config = &self.config;
+        let typed = self.options.fusion.postprocess_dmaps;
+        let bits = config.optimize.filter(|_| !bits_are_typed).unwrap_or(typed);
+        let options = DepthFilterOptions {
+            depth_diff_threshold: config.depth_diff_threshold,
+            speckle_size: config.speckle_size,
+            interpolate_gap_size: config.interpolate_gap_size,
+            min_views_filter: config.min_views_filter,
+            min_views_filter_adjust: config.min_views_filter_adjust,
+            filter_adjust: config.filter_adjust != 0,
+        };
+        options.check()?;
+        FilterJob::from_bits(bits, options)
+    }
+
+    /// Fusion.
+    ///
+    /// # Errors
+    /// Values out of range.
+    pub(crate) fn fusion(&self) -> Result<FusionOptions> {
+        let typed = &self.options.fusion;
+        let source = |level: u32, option: &str| {
+            AttributeSource::from_level(level).ok_or_else(|| {
+                Error::invalid(format!("{option} {level}: give 0 (none), 1 (after fusion) or 2"))
+            })
+        };
+        let options = FusionOptions {
+            number_views_fuse: typed.number_views_fuse,
+            depth_diff_threshold: self.config.depth_diff_threshold,
+            normal_diff_threshold_deg: self.config.normal_diff_threshold_deg,
+            estimate_colors: source(typed.estimate_colors, "--estimate-colors")?,
+            estimate_normals: source(typed.estimate_normals, "--estimate-normals")?,
+            ..FusionOptions::default()
+        };
+        options.check()?;
+        Ok(options)
+    }
+}
+
+fn masks(ignore: i32, folder: Option<PathBuf>) -> Result<Option<MaskJob>> {
+    if ignore < 0 {
+        return Ok(None);
+    }
+    let ignore = u16::try_from(ignore)
+        .map_err(|_| Error::invalid(format!("--ignore-mask-label {ignore}: mask values are 0 to 65535")))?;
+    Ok(Some(MaskJob { ignore, folder }))
+}
+
+/// The labels that the options ask for.
+///
+/// # Errors
+/// Options about classes without labels.
+pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Result<Option<LabelJob>> {
+    let sources = LabelSources {
+        label_path: typed.label_path.as_deref().map(place),
+        class_table: typed.class_table.as_deref().map(|name| table(name, place)),
+        unknown: match typed.unknown_label {
+            WhenMissing::Error => UnknownLabel::Refuse,
+            WhenMissing::Void => UnknownLabel::Void,
+        },
+        missing: match typed.missing_labels {
+            WhenMissing::Error => MissingLabels::Refuse,
+            WhenMissing::Void => MissingLabels::Void,
+        },
+    };
+    let names = |list: &[String]| {
+        list.iter().map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect::<Vec<String>>()
+    };
+    let rules = ClassRules {
+        classes: names(&typed.classes),
+        exclude: names(&typed.exclude_classes),
+        consistency: match typed.label_consistency {
+            Some(ConsistencyMode::Off) => Consistency::Off,
+            Some(ConsistencyMode::Strict) => Consistency::Strict,
+            Some(ConsistencyMode::Support) | None => Consistency::Support,
+        },
+        border: typed.label_border,
+    };
+    if sources.are_given() {
+        return Ok(Some(LabelJob { sources, rules }));
+    }
+    let asked = [
+        (!rules.classes.is_empty(), "--classes"),
+        (!rules.exclude.is_empty(), "--exclude-classes"),
+        (typed.label_consistency.is_some(), "--label-consistency"),
+        (typed.label_border > 0, "--label-border"),
+    ];
+    match asked.iter().find(|(asked, _)| *asked) {
+        Some((_, option)) => {
+            Err(Error::invalid(format!("{option} needs labels: give --label-path, --class-table or both")))
+        }
+        None => Ok(None),
+    }
+}
+
+/// A class table as typed: a file if there is one of that name, else the name of a built-in table.
+fn table(name: &str, place: &dyn Fn(&Path) -> PathBuf) -> String {
+    let path = place(Path::new(name));
+    let is_builtin = crate::semantics::ClassTable::builtin_names().any(|builtin| builtin == name);
+    match path.to_str() {
+        Some(path) if !is_builtin && Path::new(path).is_file() => path.to_owned(),
+        _ => name.to_owned(),
+    }
+}
+
+/// The layout of clouds, `default` where none is typed.
+pub(crate) fn layout(typed: &LabelOutput, default: PlyLayout) -> PlyLayout {
+    typed.ply_layout.map_or(default, typed_layout)
+}
+
+/// The layout of that name.
+pub(crate) fn typed_layout(typed: TypedLayout) -> PlyLayout {
+    match typed {
+        TypedLayout::Plain => PlyLayout::Plain,
+        TypedLayout::Openmvs => PlyLayout::OpenMvs,
+    }
+}
+
+/// The instruction set that `SEMVS_CPU` names, else the best of this processor.
+///
+/// # Errors
+/// The variable names none or one that the processor lacks.
+pub(crate) fn cpu() -> Result<CpuLevel> {
+    match std::env::var("SEMVS_CPU") {
+        Ok(name) if !name.is_empty() => {
+            name.parse().map_err(|e: Error| Error::invalid(format!("SEMVS_CPU: {e}")))
+        }
+        _ => Ok(CpuLevel::detect()),
+    }
+}
