@@ -9,6 +9,7 @@ mod gaps;
 mod normals;
 mod options;
 mod speckle;
+mod unbiased;
 mod warp;
 
 use crate::scene::{DepthEstimate, LabelMap};
@@ -18,6 +19,7 @@ pub use gaps::fill_gaps;
 pub use normals::normals_from_depth;
 pub use options::DepthFilterOptions;
 pub use speckle::remove_speckles;
+pub use unbiased::{UnbiasedFilterOptions, Votes, count_votes, filter_unbiased};
 
 /// A view as the cross-view filters see it.
 #[derive(Clone, Copy, Debug)]
