@@ -1,6 +1,7 @@
 //! Forward warp of one view's depths into another view.
 
 use super::FilterView;
+use crate::geometry::Lens;
 use crate::scene::Grid;
 
 /// What a neighbour sees along the ray of a reference pixel.
@@ -24,27 +25,37 @@ pub(super) fn warp_into(
     reference: &FilterView<'_>,
     neighbor: &FilterView<'_>,
 ) {
-    let (from, to) = (&neighbor.estimate.camera, &reference.estimate.camera);
+    let (from, to) = (Lens::new(&neighbor.estimate.camera), Lens::new(&reference.estimate.camera));
     let depths = &neighbor.estimate.depth;
     let labels = reference.labels.zip(neighbor.labels);
+    let (width, height) = (warped.width() as i32, warped.height() as i32);
+    let mut points: Vec<Projected> = Vec::with_capacity(depths.width());
     for y in 0..depths.height() {
-        for (x, &depth) in depths.row(y).iter().enumerate() {
-            if depth == 0.0 {
+        points.clear();
+        points.extend(depths.row(y).iter().enumerate().map(|(x, &depth)| {
+            let point = to.cam_point(from.world_point(x as u32, y as u32, depth));
+            let [u, v] = to.pixel(point);
+            Projected {
+                u,
+                v,
+                depth: if depth == 0.0 { 0.0 } else { point[2] as f32 },
+                in_front: point[2] > 0.0,
+            }
+        }));
+        for (x, point) in points.iter().enumerate() {
+            let inside =
+                point.u > -1.0 && point.v > -1.0 && point.u < f64::from(width) && point.v < f64::from(height);
+            if point.depth == 0.0 || !point.in_front || !inside {
                 continue;
             }
             let i = depths.index(x, y);
-            let point = to.cam_from_world(&from.world_from_image(x as f64, y as f64, f64::from(depth)));
-            if point.z <= 0.0 {
-                continue;
-            }
             let pixel = WarpedPixel {
-                depth: point.z as f32,
+                depth: point.depth,
                 confidence: neighbor.estimate.confidence.as_ref().map_or(1.0, |c| c.data()[i]),
             };
-            let (u, v) = to.image_from_cam(&point);
-            let (u0, u1, v0, v1) = (u.floor(), u.ceil(), v.floor(), v.ceil());
-            for (u, v) in [(u0, v0), (u0, v1), (u1, v0), (u1, v1)] {
-                if !(u >= 0.0 && v >= 0.0 && u < warped.width() as f64 && v < warped.height() as f64) {
+            let ((left, right), (top, bottom)) = (floor_and_ceil(point.u), floor_and_ceil(point.v));
+            for (u, v) in [(left, top), (left, bottom), (right, top), (right, bottom)] {
+                if u < 0 || v < 0 || u >= width || v >= height {
                     continue;
                 }
                 let target = (u as usize, v as usize);
@@ -60,7 +71,38 @@ pub(super) fn warp_into(
     }
 }
 
+/// A pixel of the neighbour in the reference view.
+#[derive(Clone, Copy)]
+struct Projected {
+    u: f64,
+    v: f64,
+    /// 0 = the neighbour has no depth.
+    depth: f32,
+    in_front: bool,
+}
+
+/// The whole numbers around `value`, which is above −1 and small.
+#[inline]
+fn floor_and_ceil(value: f64) -> (i32, i32) {
+    let truncated = value as i32;
+    let floor = truncated - i32::from(f64::from(truncated) > value);
+    (floor, floor + i32::from(f64::from(floor) < value))
+}
+
 /// Whether two labels are different classes; void (0) is no class.
 fn differ(a: u16, b: u16) -> bool {
     a != b && a != 0 && b != 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_around_a_value() {
+        for value in [-0.999, -0.5, -0.0, 0.0, 0.25, 1.0, 7.999, 4096.5] {
+            let expected = (f64::floor(value) as i32, f64::ceil(value) as i32);
+            assert_eq!(floor_and_ceil(value), expected, "{value}");
+        }
+    }
 }

@@ -2,9 +2,8 @@
 //! there? Reads only what cannot change while the view has its turn, so rows are independent.
 
 use super::FusionMaps;
-use super::lens::Lens;
 use super::state::FreePixels;
-use crate::geometry::is_similar_depth;
+use crate::geometry::{Lens, is_similar_depth};
 use crate::scene::{LabelMap, ViewIndex};
 use crate::semantics::{Agreement, ClassPolicy};
 

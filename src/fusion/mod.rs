@@ -8,7 +8,6 @@
 mod accumulate;
 mod color;
 mod correspond;
-mod lens;
 mod maps;
 mod merge;
 mod normals;
