@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// Oriented photographs to dense, semantically labelled point clouds.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "semvs", version, propagate_version = true, after_help = EXAMPLES)]
+#[command(name = "semvs", version, after_help = EXAMPLES)]
 pub(crate) struct SemvsArgs {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -70,14 +70,17 @@ Examples:
       everything into the folder out/
   semvs densify scene.mvs -o draft.ply --resolution-level 2 --number-views 3 --geometric-iters 1
       a quick look
-  semvs densify scene.mvs -o cloud.ply --label-path labels --class-table classes.toml --report run.json
-      with classes of your own: classes.toml holds [[class]] entries with id, name, color = [r, g, b]";
+  semvs densify scene.mvs -o cloud.ply --label-path labels --class-table classes.toml
+      with classes of your own: classes.toml has entries [[class]] with id, name and color";
 
 /// Fuse depth maps that exist into a cloud, without estimating anything
 ///
 /// Takes the depth maps of semvs and of OpenMVS (depthNNNN.dmap). The depth maps are only read.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = FUSE_EXAMPLES)]
+#[command(
+    after_help = FUSE_EXAMPLES,
+    mut_args(|arg| if NOT_FOR_FUSE.contains(&arg.get_id().as_str()) { arg.hide(true) } else { arg })
+)]
 pub(crate) struct FuseArgs {
     /// Scene that the depth maps belong to (OpenMVS's .mvs)
     #[arg(value_name = "SCENE.mvs")]
@@ -92,11 +95,23 @@ pub(crate) struct FuseArgs {
     pub(crate) shared: SharedOptions,
 }
 
+/// Shared options that have no effect when nothing is estimated; taken all the same, so that a command line can be
+/// reused.
+const NOT_FOR_FUSE: &[&str] = &[
+    "number_views",
+    "sub_resolution_levels",
+    "iters",
+    "geometric_iters",
+    "fusion_mode",
+    "postprocess_dmaps",
+    "remove_dmaps",
+];
+
 const FUSE_EXAMPLES: &str = "\
 Examples:
   semvs fuse scene.mvs --depth-maps depthmaps -o cloud.ply
-  semvs fuse scene.mvs --depth-maps depthmaps -o facade.ply --label-path labels --class-table 3dom-facade \\
-      --classes building,window,door --label-consistency strict";
+  semvs fuse scene.mvs --depth-maps depthmaps -o facade.ply --label-path labels \\
+      --class-table 3dom-facade --classes building,window,door --label-consistency strict";
 
 /// Turn depth maps into a cloud, every depth a point, without fusion
 #[derive(Clone, Debug, Args)]

@@ -50,7 +50,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     clock.stage("prepare");
 
     let use_existing = job.stereo.geometric_iterations == 0;
-    let existing = existing_maps(&prepared, &store, use_existing, progress)?;
+    let existing = existing_maps(&prepared, &store, use_existing, job.input.strict, progress)?;
     let estimation = Estimation {
         prepared: &prepared,
         store: &store,

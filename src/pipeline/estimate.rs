@@ -4,7 +4,7 @@ use super::job::FilterJob;
 use super::prepare::Prepared;
 use super::problem::stereo_problem;
 use crate::depth_filter::{fill_gaps, remove_speckles};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::progress::{Event, Progress, Stage};
 use crate::scene::{DepthEstimate, ImageId, ViewIndex};
 use crate::stereo::{self, CpuLevel, StereoOptions};
@@ -28,10 +28,14 @@ pub(super) struct Estimation<'a> {
 ///
 /// Without geometric passes every map whose id, size and camera fit is; with them no map is, because nothing tells
 /// what it was made from. What is not used is said in a line.
+///
+/// # Errors
+/// With `strict`, a map that was to be used and does not fit.
 pub(super) fn existing_maps(
     prepared: &Prepared,
     store: &DepthStore,
     use_existing: bool,
+    strict: bool,
     progress: &Progress,
 ) -> Result<BTreeSet<ViewIndex>> {
     let mut used = BTreeSet::new();
@@ -41,6 +45,7 @@ pub(super) fn existing_maps(
             Existing::Absent => {}
             Existing::Usable if use_existing => drop(used.insert(view)),
             Existing::Usable => unused += 1,
+            Existing::Unusable(why) if use_existing && strict => return Err(Error::Invalid(why)),
             Existing::Unusable(why) => progress.warn(format!("{why}; the depth map is estimated again")),
         }
     }

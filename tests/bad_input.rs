@@ -1,0 +1,243 @@
+//! Bad input ends in one clear line and exit code 1: no panic, nothing half-written, nothing lost.
+
+mod common;
+
+use common::Scratch;
+use semvs_formats::Limits;
+use semvs_formats::mvs::{self, NEWEST_VERSION, Scene};
+
+const SMALL: &str = "--resolution-level 1 --min-resolution 160 --estimate-roi 0";
+const FUSE_ONLY: &str =
+    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
+
+/// The scene with a change.
+fn changed(change: impl FnOnce(&mut Scene)) -> Scratch {
+    let scratch = Scratch::facade6();
+    let mut scene = mvs::read(scratch.path("scene.mvs"), &Limits::default()).unwrap();
+    change(&mut scene);
+    let mut bytes = Vec::new();
+    // Written by way of the file value: bad indices are what is wanted here.
+    let file = mvs::SceneFile {
+        scene,
+        container: mvs::Container::Interface { version: NEWEST_VERSION },
+        reserved: 0,
+        trailing_bytes: 0,
+    };
+    file.write(&mut bytes).unwrap();
+    scratch.write("scene.mvs", bytes);
+    scratch
+}
+
+/// Both programs refuse the scene, naming `needles`, and write nothing but a log.
+#[track_caller]
+fn refused(scratch: &Scratch, options: &str, needles: &[&str]) {
+    let files = || scratch.files().into_iter().filter(|f| !f.ends_with(".log")).collect::<Vec<String>>();
+    let before = files();
+    scratch.semvs(&format!("densify scene.mvs -o out/cloud.ply -w out {options}")).fails_naming(needles);
+    scratch.densify_point_cloud(&format!("scene.mvs -o dense {options}")).fails_naming(needles);
+    assert_eq!(before, files());
+}
+
+#[test]
+fn scenes_cut_short_or_corrupt() {
+    let scratch = Scratch::facade6();
+    let whole = scratch.read("scene.mvs");
+    for length in [0, 3, 8, 20, 100, whole.len() / 2, whole.len() - 1] {
+        scratch.write("scene.mvs", &whole[..length]);
+        refused(&scratch, SMALL, &["scene.mvs"]);
+    }
+    // A count beyond the end of the file: the number of platforms.
+    let mut bytes = whole.clone();
+    bytes[12..20].copy_from_slice(&u64::MAX.to_le_bytes());
+    scratch.write("scene.mvs", &bytes);
+    refused(&scratch, SMALL, &["scene.mvs"]);
+    scratch.write("scene.mvs", "this is not a scene");
+    refused(&scratch, SMALL, &["scene.mvs"]);
+}
+
+#[test]
+fn impossible_cameras() {
+    for bad in [f64::NAN, f64::INFINITY] {
+        let scratch = changed(|scene| scene.platforms[0].poses[2].center[1] = bad);
+        refused(&scratch, SMALL, &["scene.mvs", "poses[2]"]);
+        let scratch = changed(|scene| scene.platforms[0].poses[2].rotation[4] = bad);
+        refused(&scratch, SMALL, &["scene.mvs", "poses[2]"]);
+    }
+    let scratch = changed(|scene| scene.platforms[0].cameras[0].k[0] = 0.0);
+    refused(&scratch, SMALL, &["scene.mvs", "cameras[0]"]);
+}
+
+#[test]
+fn indices_out_of_range() {
+    refused(&changed(|scene| scene.images[1].platform = 9), SMALL, &["scene.mvs", "images[1]"]);
+    refused(&changed(|scene| scene.images[1].camera = 9), SMALL, &["scene.mvs", "images[1]"]);
+    refused(&changed(|scene| scene.images[1].pose = 99), SMALL, &["scene.mvs", "images[1]"]);
+}
+
+#[test]
+fn too_few_views_and_no_points() {
+    let scratch = changed(|scene| scene.images.iter_mut().skip(1).for_each(|i| i.pose = mvs::NO_ID));
+    refused(&scratch, SMALL, &["scene.mvs", "at least two"]);
+    let scratch = Scratch::facade6();
+    for name in ["0004", "0005", "0006", "0012", "0013"] {
+        std::fs::remove_file(scratch.path(&format!("images/{name}.jpg"))).unwrap();
+    }
+    refused(&scratch, SMALL, &["scene.mvs", "at least two"]);
+    let scratch = changed(|scene| scene.points = mvs::PointCloud::default());
+    refused(&scratch, SMALL, &["no sparse points"]);
+}
+
+#[test]
+fn images_that_cannot_be_used_are_left_out_unless_strict() {
+    let make: [(&str, fn(&Scratch)); 4] = [
+        ("missing", |s| std::fs::remove_file(s.path("images/0005.jpg")).unwrap()),
+        ("cut short", |s| s.edit("images/0005.jpg", |bytes| bytes.truncate(bytes.len() / 2))),
+        ("no image", |s| drop(s.write("images/0005.jpg", "not a JPEG"))),
+        ("other shape", |s| {
+            std::fs::copy(s.path("labels/0005_l.png"), s.path("images/0005.jpg")).unwrap();
+            s.write("images/0005.jpg", wide_png());
+        }),
+    ];
+    for (what, spoil) in make {
+        let scratch = Scratch::facade6();
+        scratch.add_maps("post7", ".");
+        spoil(&scratch);
+        let out = scratch.densify_point_cloud(&format!("scene.mvs {FUSE_ONLY}")).ok();
+        assert!(
+            out.stdout.contains("warning: ") && out.stdout.contains("0005.jpg"),
+            "{what}: {}",
+            out.stdout
+        );
+        assert!(
+            out.stdout.contains("Preparing images for dense reconstruction completed: 5 images"),
+            "{what}"
+        );
+        let strict = scratch.densify_point_cloud(&format!("scene.mvs --strict {FUSE_ONLY}"));
+        strict.fails_naming(&["0005.jpg"]);
+    }
+}
+
+/// A PNG of 60×20 pixels.
+fn wide_png() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 60, 20);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.write_header().unwrap().write_image_data(&[128; 60 * 20 * 3]).unwrap();
+    bytes
+}
+
+#[test]
+fn faulty_label_maps_are_found_before_work() {
+    let labels = "--label-path labels --class-table 3dom-facade";
+    let scratch = Scratch::facade6();
+    std::fs::remove_file(scratch.path("labels/0004_l.png")).unwrap();
+    refused(&scratch, &format!("{SMALL} {labels}"), &["0004.jpg", "--missing-labels void"]);
+
+    scratch.write("labels/0004_l.png", wide_png());
+    refused(&scratch, &format!("{SMALL} {labels}"), &["0004_l.png", "60×20", "400×300"]);
+
+    let scratch = Scratch::facade6();
+    scratch.edit("labels/0004_l.png", |bytes| bytes.truncate(bytes.len() / 2));
+    refused(&scratch, &format!("{SMALL} {labels}"), &["0004_l.png"]);
+
+    let scratch = Scratch::facade6();
+    let table = "[[class]]\nid = 1\nname = \"building\"\ncolor = [0, 0, 255]\n";
+    scratch.write("one.toml", table);
+    let one = "--label-path labels --class-table one.toml";
+    refused(&scratch, &format!("{SMALL} {one}"), &["_l.png", "colour (", "--unknown-label void"]);
+    refused(&scratch, &format!("{SMALL} --label-path labels"), &["_l.png", "--class-table"]);
+    refused(&scratch, &format!("{SMALL} --label-path nowhere --class-table ids"), &["nowhere"]);
+    refused(&scratch, &format!("{SMALL} {labels} --exclude-classes skye"), &["skye", "sky"]);
+    scratch.write("one.toml", format!("{table}{table}"));
+    refused(&scratch, &format!("{SMALL} {one}"), &["one.toml"]);
+}
+
+#[test]
+fn places_that_cannot_be_written() {
+    let scratch = Scratch::facade6();
+    scratch.write("file", "in the way");
+    std::fs::create_dir(scratch.path("folder.ply")).unwrap();
+    let fail = |words: &str, needle: &str| {
+        scratch.semvs(&format!("densify scene.mvs {SMALL} {words}")).fails_naming(&[needle]);
+    };
+    fail("-o file/cloud.ply", "file");
+    fail("-o folder.ply", "folder.ply");
+    fail("-o ok.ply -w file/maps", "file");
+    fail("-o ok.ply --report file/run.json", "file");
+    fail("-o /proc/none/cloud.ply", "/proc/none");
+    scratch.densify_point_cloud(&format!("scene.mvs -w file {SMALL}")).fails_naming(&["file"]);
+    scratch.densify_point_cloud(&format!("scene.mvs -o file/dense {SMALL}")).fails_naming(&["file"]);
+    assert_eq!(scratch.read("file"), b"in the way");
+    assert!(!scratch.files().iter().any(|f| f.ends_with(".dmap") || f.ends_with(".mvs") && f != "scene.mvs"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_read_only_folder() {
+    use std::os::unix::fs::PermissionsExt;
+    let scratch = Scratch::facade6();
+    std::fs::create_dir(scratch.path("locked")).unwrap();
+    std::fs::set_permissions(scratch.path("locked"), std::fs::Permissions::from_mode(0o555)).unwrap();
+    if std::fs::write(scratch.path("locked/probe"), "").is_ok() {
+        println!("permissions do not bind this user: skipped");
+        return;
+    }
+    for words in ["-o locked/cloud.ply", "-o ok.ply -w locked"] {
+        scratch.semvs(&format!("densify scene.mvs {SMALL} {words}")).fails_naming(&["locked"]);
+    }
+}
+
+#[test]
+fn depth_maps_that_do_not_belong() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps");
+    let good = scratch.read("maps/depth0001.dmap");
+    let fuse = "fuse scene.mvs --depth-maps maps -o fused.ply";
+    scratch.write("fused.ply", "from before");
+    // Of another image.
+    scratch.write("maps/depth0001.dmap", scratch.read("maps/depth0002.dmap"));
+    scratch.semvs(fuse).fails_naming(&["depth0001.dmap", "image 0002"]);
+    // Cut short, damaged, empty.
+    for length in [0, 10, 200, good.len() - 1] {
+        scratch.write("maps/depth0001.dmap", &good[..length]);
+        scratch.semvs(fuse).fails_naming(&["depth0001.dmap"]);
+        scratch.semvs("convert maps/depth0001.dmap -o fused.ply").fails_naming(&["depth0001.dmap"]);
+        scratch.semvs("inspect maps/depth0001.dmap").fails_naming(&["depth0001.dmap"]);
+    }
+    // Of another scene: the camera stands elsewhere.
+    scratch.write("maps/depth0001.dmap", &good);
+    let mut scene = mvs::read(scratch.path("scene.mvs"), &Limits::default()).unwrap();
+    scene.platforms[0].poses.iter_mut().for_each(|pose| pose.center[0] += 1.0);
+    let mut bytes = Vec::new();
+    mvs::write_interface(&mut bytes, &scene, NEWEST_VERSION).unwrap();
+    scratch.write("moved.mvs", bytes);
+    scratch
+        .semvs("fuse moved.mvs --depth-maps maps -o fused.ply")
+        .fails_naming(&["depth0000.dmap", "stands elsewhere"]);
+    std::fs::create_dir(scratch.path("empty")).unwrap();
+    scratch.semvs("fuse scene.mvs --depth-maps empty -o fused.ply").fails_naming(&["empty", "no depth map"]);
+    scratch.semvs("fuse scene.mvs --depth-maps none -o fused.ply").fails_naming(&["none"]);
+    assert_eq!(scratch.read("fused.ply"), b"from before");
+}
+
+#[test]
+fn clouds_cut_short_or_corrupt() {
+    let scratch = Scratch::new();
+    let whole = std::fs::read(common::facade6().join("truth/truth.ply")).unwrap();
+    scratch.write("truth.ply", &whole);
+    for length in [0, 4, 60, whole.len() / 2, whole.len() - 1] {
+        scratch.write("cloud.ply", &whole[..length]);
+        let out = scratch.semvs("evaluate cloud.ply --truth truth.ply --thresholds 0.1");
+        out.fails_naming(&["cloud.ply"]);
+        scratch.semvs("inspect cloud.ply").fails_naming(&["cloud.ply"]);
+    }
+    let text = String::from_utf8_lossy(&whole[..300]).into_owned();
+    let start = text.find("element vertex ").unwrap() + "element vertex ".len();
+    let mut hostile = whole.clone();
+    hostile.splice(start..start, b"99999999999".iter().copied());
+    scratch.write("cloud.ply", hostile);
+    scratch.semvs("inspect cloud.ply").fails_naming(&["cloud.ply"]);
+    let missing = scratch.semvs("evaluate none.ply --truth truth.ply --thresholds 0.1");
+    missing.fails_naming(&["none.ply"]);
+    scratch.semvs("evaluate truth.ply --truth truth.ply --thresholds -1").fails_naming(&["-1"]);
+}

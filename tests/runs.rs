@@ -1,0 +1,193 @@
+//! Whole runs on the bundled scene: the same bytes for any number of threads, labels, resuming, companions.
+
+mod common;
+
+use common::Scratch;
+use semvs_formats::Limits;
+use semvs_formats::dmap::DepthMapFile;
+use semvs_formats::ply::{Cloud, read_cloud};
+use std::collections::BTreeMap;
+
+const SMALL: &str = "--resolution-level 1 --min-resolution 160 --estimate-roi 0";
+const FUSE_ONLY: &str =
+    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
+const LABELS: &str = "--label-path labels --class-table 3dom-facade";
+
+/// All files below `folder` but logs.
+fn outputs(scratch: &Scratch, folder: &str) -> BTreeMap<String, Vec<u8>> {
+    scratch
+        .files()
+        .into_iter()
+        .filter(|f| f.starts_with(&format!("{folder}/")) && !f.ends_with(".log"))
+        .map(|f| (f[folder.len() + 1..].to_owned(), scratch.read(&f)))
+        .collect()
+}
+
+fn cloud(scratch: &Scratch, name: &str) -> Cloud {
+    read_cloud(scratch.read(name).as_slice(), &Limits::default()).unwrap()
+}
+
+#[test]
+fn every_byte_is_the_same_for_any_number_of_threads() {
+    let scratch = Scratch::facade6();
+    let runs = [("a", 1), ("b", 2), ("c", 5), ("d", 2)];
+    for (folder, threads) in runs {
+        let out = format!(
+            "-w {folder} -o {folder}/x.ply --max-threads {threads} --split-by-class --color-by-label"
+        );
+        scratch.semvs(&format!("densify scene.mvs {out} {SMALL} {LABELS} --exclude-classes sky")).ok();
+    }
+    let first = outputs(&scratch, "a");
+    assert_eq!(first.keys().filter(|f| f.ends_with(".dmap")).count(), 6);
+    assert!(first.contains_key("x.ply") && first.contains_key("x.mvs") && first.contains_key("x.labels.ply"));
+    for (folder, threads) in &runs[1..] {
+        let other = outputs(&scratch, folder);
+        assert_eq!(first.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+        for (name, bytes) in &first {
+            assert!(*bytes == other[name], "{name} differs with {threads} threads");
+        }
+    }
+    let points = cloud(&scratch, "a/x.ply").len();
+    assert!(points > 10_000, "{points}");
+}
+
+#[test]
+fn labels_that_decide_nothing_change_no_geometry() {
+    let scratch = Scratch::facade6();
+    scratch.semvs(&format!("densify scene.mvs -w plain -o plain/x.ply {SMALL}")).ok();
+    let off = "--label-consistency off";
+    scratch.semvs(&format!("densify scene.mvs -w labelled -o labelled/x.ply {SMALL} {LABELS} {off}")).ok();
+    let (plain, labelled) = (cloud(&scratch, "plain/x.ply"), cloud(&scratch, "labelled/x.ply"));
+    assert_eq!(labelled.labels.len(), plain.len());
+    assert_eq!(
+        plain,
+        Cloud {
+            labels: Vec::new(),
+            label_confidence: Vec::new(),
+            comments: plain.comments.clone(),
+            ..labelled
+        }
+    );
+    for i in 0..6 {
+        let name = format!("depth{i:04}.dmap");
+        assert_eq!(scratch.read(&format!("plain/{name}")), scratch.read(&format!("labelled/{name}")));
+    }
+}
+
+#[test]
+fn classes_are_kept_and_dropped_as_asked() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", ".");
+    let report = "--report run.json --split-by-class --color-by-label";
+    let run = |words: &str| scratch.semvs(&format!("densify scene.mvs {FUSE_ONLY} {LABELS} {words}")).ok();
+    let out = run(&format!("-o kept.ply --exclude-classes sky,obstacle {report}"));
+    let kept = cloud(&scratch, "kept.ply");
+    assert!(kept.labels.iter().all(|l| ![2, 3].contains(l)));
+    for class in [1, 4, 5] {
+        assert!(kept.labels.contains(&class), "class {class}");
+    }
+    assert!(kept.comments.iter().any(|c| c == "class 1 building 0 0 255"), "{:?}", kept.comments);
+    let parts = ["building", "window", "door", "void"].map(|c| format!("kept.{c}.ply"));
+    let parts: usize = parts.iter().filter(|p| scratch.has(p)).map(|p| cloud(&scratch, p).len()).sum();
+    assert_eq!(parts, kept.len());
+    let colored = cloud(&scratch, "kept.labels.ply");
+    let window = colored.labels.iter().position(|&l| l == 4).unwrap();
+    assert_eq!(colored.colors[window], [0, 255, 0]);
+    assert!(out.stdout.contains("building"), "{}", out.stdout);
+
+    let json: serde_json::Value = serde_json::from_slice(&scratch.read("run.json")).unwrap();
+    assert_eq!(json["points"], kept.len());
+    assert_eq!(json["program"], "semvs densify");
+    assert_eq!(json["options"]["exclude-classes"], "sky,obstacle");
+    assert_eq!(json["views"].as_array().unwrap().len(), 6);
+    assert_eq!(json["views"][0]["reused"], true);
+    let building = json["classes"].as_array().unwrap().iter().find(|c| c["name"] == "building").unwrap();
+    assert_eq!(building["points"], kept.labels.iter().filter(|&&l| l == 1).count());
+
+    run("-o only.ply --classes window --label-consistency strict");
+    assert!(cloud(&scratch, "only.ply").labels.iter().all(|&l| l == 4));
+    // Each mode is stricter than the one before.
+    let points = |mode: &str| {
+        run(&format!("-o {mode}.ply --label-consistency {mode}"));
+        cloud(&scratch, &format!("{mode}.ply")).len()
+    };
+    let counts = ["off", "support", "strict"].map(points);
+    assert!(counts[0] >= counts[1] && counts[1] > counts[2], "{counts:?}");
+}
+
+#[test]
+fn pixels_of_unwanted_classes_and_masked_ones_get_no_depth() {
+    let scratch = Scratch::facade6();
+    let quick = "--number-views 2 --iters 1 --geometric-iters 0 --postprocess-dmaps 0";
+    let run = |words: &str| {
+        scratch.semvs(&format!("densify scene.mvs -w d -o d/x.ply {SMALL} {quick} {words}")).ok();
+        let map = DepthMapFile::from_bytes(&scratch.read("d/depth0000.dmap"), &Limits::default()).unwrap();
+        std::fs::remove_dir_all(scratch.path("d")).unwrap();
+        map.depth
+    };
+    let valid = |depth: &[f32]| depth.iter().filter(|&&d| d > 0.0).count();
+    let all = run("");
+    let some = run(&format!("{LABELS} --exclude-classes obstacle"));
+    assert!(valid(&some) < valid(&all));
+    // A mask over the left half.
+    let pixels: Vec<u8> = (0..300).flat_map(|_| (0..400).map(|x| if x < 200 { 0 } else { 255 })).collect();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 400, 300);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+    std::fs::create_dir(scratch.path("masks")).unwrap();
+    for name in ["0003", "0004", "0005", "0006", "0012", "0013"] {
+        scratch.write(&format!("masks/{name}.mask.png"), &bytes);
+    }
+    let masked = run("--ignore-mask-label 0 --mask-path masks");
+    let left = |depth: &[f32]| (0..150).map(|y| valid(&depth[y * 200..y * 200 + 100])).sum::<usize>();
+    assert!(left(&all) > 1000);
+    assert_eq!(left(&masked), 0);
+    assert!(valid(&masked) > 1000);
+}
+
+#[test]
+fn existing_maps_are_used_only_when_asked() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", ".");
+    let theirs = scratch.read("depth0003.dmap");
+    let quick = "--number-views 2 --iters 1 --geometric-iters 1 --postprocess-dmaps 0";
+    scratch.semvs(&format!("densify scene.mvs -o kept.ply {FUSE_ONLY}")).ok();
+    assert_eq!(scratch.read("depth0003.dmap"), theirs);
+    // A map of another size is estimated again, with a line that names it.
+    scratch.write("depth0003.dmap", &theirs[..100]);
+    let out = scratch.semvs(&format!("densify scene.mvs -o kept.ply {FUSE_ONLY} --iters 1")).ok();
+    assert!(
+        out.stderr.contains("depth0003.dmap") && out.stderr.contains("estimated again"),
+        "{}",
+        out.stderr
+    );
+    scratch.write("depth0003.dmap", &theirs);
+    let out = scratch.semvs(&format!("densify scene.mvs -o new.ply {SMALL} {quick}")).ok();
+    assert!(
+        out.stderr.contains("6 depth maps exist") && out.stderr.contains("estimated again"),
+        "{}",
+        out.stderr
+    );
+    assert_ne!(scratch.read("depth0003.dmap"), theirs);
+    let out = scratch.semvs(&format!("densify scene.mvs -o gone.ply {FUSE_ONLY} --remove-dmaps 1")).ok();
+    assert!(!out.stdout.contains("depth maps"), "{}", out.stdout);
+    assert!(!scratch.files().iter().any(|f| f.ends_with(".dmap")));
+}
+
+#[test]
+fn a_run_leaves_its_results_and_nothing_else() {
+    let scratch = Scratch::facade6();
+    let before = scratch.files();
+    let quick = "--number-views 2 --iters 1 --geometric-iters 1";
+    let scene = scratch.path("scene.mvs");
+    scratch.densify_point_cloud(&format!("{} -w depthmaps {SMALL} {quick}", scene.display())).ok();
+    let mut expected = before;
+    expected.extend((0..6).map(|i| format!("depthmaps/depth{i:04}.dmap")));
+    expected.extend(["scene_dense.mvs".to_owned(), "scene_dense.ply".to_owned()]);
+    expected.sort();
+    let after: Vec<String> = scratch.files().into_iter().filter(|f| !f.ends_with(".log")).collect();
+    assert_eq!(after, expected);
+    let dense = cloud(&scratch, "scene_dense.ply");
+    assert!(dense.has_views() && dense.len() > 1000);
+}
