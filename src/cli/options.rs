@@ -2,7 +2,7 @@
 //! Names, meanings and defaults are those of OpenMVS 2.3.0.
 
 use super::values::boolean;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 /// Where to work and how hard.
@@ -76,9 +76,12 @@ pub(crate) struct EstimationOptions {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Filtering and fusion")]
 pub(crate) struct FusionOptions {
-    /// Filters on the depth maps, a sum of: 1 = remove speckles, 2 = fill gaps, 4 = adjust across views
+    /// Filters on the depth maps, a sum of: 1 = remove speckles, 2 = fill gaps, 4 = filter across views
     #[arg(long, value_name = "BITS", default_value_t = 7)]
     pub(crate) postprocess_dmaps: u32,
+    /// The filter across views [default: unbiased in semvs, openmvs in DensifyPointCloud]
+    #[arg(long, value_name = "FILTER", value_enum)]
+    pub(crate) filter: Option<FilterKind>,
     /// Fewest images that must agree on a point; below 2 every depth becomes a point
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub(crate) number_views_fuse: u32,
@@ -91,6 +94,15 @@ pub(crate) struct FusionOptions {
     /// Delete the depth maps at the end
     #[arg(long, value_name = "0|1", default_value = "0", value_parser = boolean, action = clap::ArgAction::Set)]
     pub(crate) remove_dmaps: bool,
+}
+
+/// `--filter`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FilterKind {
+    /// OpenMVS's: depths move towards those of the neighbours
+    Openmvs,
+    /// depths stay as they are or are dropped
+    Unbiased,
 }
 
 /// What part of the scene is wanted.

@@ -2,11 +2,11 @@
 
 use super::dense_config::{self, DenseConfig};
 use super::label_options::{ConsistencyMode, LabelInput, LabelOutput, PlyLayout as TypedLayout, WhenMissing};
-use super::options::SharedOptions;
-use crate::depth_filter::DepthFilterOptions;
+use super::options::{FilterKind, SharedOptions};
+use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions};
-use crate::pipeline::{FilterJob, LabelJob, MaskJob, RoiJob, SceneJob};
+use crate::pipeline::{AcrossViews, FilterJob, LabelJob, MaskJob, RoiJob, SceneJob};
 use crate::scene::{NeighborOptions, OutsideRoi, ResolutionOptions, RoiEstimation};
 use crate::semantics::{ClassRules, Consistency};
 use crate::stereo::{CpuLevel, StereoOptions};
@@ -137,11 +137,12 @@ impl<'a> Resolver<'a> {
         Ok(options)
     }
 
-    /// Cleaning; "Optimize" of the dense config file counts when `bits_are_typed` is false.
+    /// Cleaning; "Optimize" of the dense config file counts when `bits_are_typed` is false. `default`: the filter
+    /// across views when none is typed.
     ///
     /// # Errors
     /// Values out of range.
-    pub(crate) fn filter(&self, bits_are_typed: bool) -> Result<FilterJob> {
+    pub(crate) fn filter(&self, bits_are_typed: bool, default: FilterKind) -> Result<FilterJob> {
         let config = &self.config;
         let typed = self.options.fusion.postprocess_dmaps;
         let bits = config.optimize.filter(|_| !bits_are_typed).unwrap_or(typed);
@@ -154,7 +155,15 @@ impl<'a> Resolver<'a> {
             filter_adjust: config.filter_adjust != 0,
         };
         options.check()?;
-        FilterJob::from_bits(bits, options)
+        let across = match self.options.fusion.filter.unwrap_or(default) {
+            FilterKind::Openmvs => AcrossViews::OpenMvs,
+            FilterKind::Unbiased => AcrossViews::Unbiased(UnbiasedFilterOptions {
+                max_depth_diff: config.depth_diff_threshold,
+                min_confirming: config.min_views_filter_adjust,
+                ..UnbiasedFilterOptions::default()
+            }),
+        };
+        FilterJob::from_bits(bits, across, options)
     }
 
     /// Fusion.

@@ -104,6 +104,7 @@ const NOT_FOR_FUSE: &[&str] = &[
     "geometric_iters",
     "fusion_mode",
     "postprocess_dmaps",
+    "filter",
     "remove_dmaps",
 ];
 

@@ -61,8 +61,8 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     };
     let mapped = estimation.run(&existing)?;
     clock.stage("estimate");
-    if job.filter.adjust {
-        filter_across_views(&prepared, &store, &mapped, &job.filter, progress)?;
+    if let Some(across) = &job.filter.across {
+        filter_across_views(&prepared, &store, &mapped, across, &job.filter.options, progress)?;
         clock.stage("filter");
     }
     let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };

@@ -1,9 +1,11 @@
 //! The filter across views: every depth is held against the maps of the neighbours.
 
 use super::estimate::{for_each_view, replace_all};
-use super::job::FilterJob;
+use super::job::AcrossViews;
 use super::prepare::Prepared;
-use crate::depth_filter::{FilterView, MAX_NEIGHBORS, filter_consistency};
+use crate::depth_filter::{
+    DepthFilterOptions, FilterView, MAX_NEIGHBORS, filter_consistency, filter_unbiased,
+};
 use crate::error::Result;
 use crate::progress::{Event, Progress, Stage};
 use crate::scene::{DepthEstimate, DepthMap, ImageId, ViewIndex};
@@ -20,9 +22,14 @@ pub(super) fn filter_across_views(
     prepared: &Prepared,
     store: &DepthStore,
     views: &[ViewIndex],
-    filter: &FilterJob,
+    across: &AcrossViews,
+    options: &DepthFilterOptions,
     progress: &Progress,
 ) -> Result<()> {
+    let most = match across {
+        AcrossViews::OpenMvs => MAX_NEIGHBORS,
+        AcrossViews::Unbiased(options) => options.max_neighbors as usize,
+    };
     let ids: BTreeSet<ImageId> = views.iter().map(|&v| prepared.id(v)).collect();
     let steps = progress.start(Stage::Filter, views.len());
     replace_all(store, &ids, || {
@@ -34,12 +41,15 @@ pub(super) fn filter_across_views(
                 .iter()
                 .map(|n| prepared.id(n.view))
                 .filter(|id| ids.contains(id))
-                .take(MAX_NEIGHBORS)
+                .take(most)
                 .map(|id| store.read(id))
                 .collect::<Result<Vec<Arc<DepthEstimate>>>>()?;
             let against: Vec<FilterView<'_>> = neighbors.iter().map(|n| FilterView::new(n)).collect();
-            let mut filtered =
-                filter_consistency(&FilterView::new(&reference), &against, prepared.count(), &filter.options);
+            let own = FilterView::new(&reference);
+            let mut filtered = match across {
+                AcrossViews::OpenMvs => filter_consistency(&own, &against, prepared.count(), options),
+                AcrossViews::Unbiased(options) => filter_unbiased(&own, &against, options),
+            };
             filtered.image_name.clone_from(&prepared.loaded.scene.views[view.index()].name);
             store.write_pending(&filtered)?;
             let (before, after) = (valid_depths(&reference.depth), valid_depths(&filtered.depth));

@@ -1,6 +1,6 @@
 //! Jobs: what the programs ask the pipeline to do, with every value resolved.
 
-use crate::depth_filter::DepthFilterOptions;
+use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::FusionOptions;
 use crate::report::OutputReport;
@@ -95,24 +95,38 @@ pub struct FilterJob {
     pub speckles: bool,
     /// Fill small gaps.
     pub gaps: bool,
-    /// Filter across views.
-    pub adjust: bool,
+    /// Filter across views, if any.
+    pub across: Option<AcrossViews>,
     /// Thresholds.
     pub options: DepthFilterOptions,
 }
 
+/// Filters across views.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AcrossViews {
+    /// OpenMVS's, which moves depths towards those of the neighbours.
+    OpenMvs,
+    /// The one that keeps or drops depths as they are.
+    Unbiased(UnbiasedFilterOptions),
+}
+
 impl FilterJob {
-    /// The filters of OpenMVS's `--postprocess-dmaps`.
+    /// The filters of OpenMVS's `--postprocess-dmaps`, of which bit 2 stands for `across`.
     ///
     /// # Errors
     /// Bits that mean nothing.
-    pub fn from_bits(bits: u32, options: DepthFilterOptions) -> Result<Self> {
+    pub fn from_bits(bits: u32, across: AcrossViews, options: DepthFilterOptions) -> Result<Self> {
         if bits > 7 {
             let what =
                 format!("--postprocess-dmaps {bits}: give a sum of 1 (speckles), 2 (gaps), 4 (adjust)");
             return Err(Error::invalid(what));
         }
-        Ok(FilterJob { speckles: bits & 1 != 0, gaps: bits & 2 != 0, adjust: bits & 4 != 0, options })
+        Ok(FilterJob {
+            speckles: bits & 1 != 0,
+            gaps: bits & 2 != 0,
+            across: (bits & 4 != 0).then_some(across),
+            options,
+        })
     }
 }
 

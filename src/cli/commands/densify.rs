@@ -2,6 +2,7 @@
 
 use super::{cloud_path, conclude, default_cloud, is_typed, options_in_effect};
 use crate::cli::listen::Recorder;
+use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::DensifyArgs;
 use crate::error::{Error, Result};
@@ -53,7 +54,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder },
         stereo: resolver.stereo()?,
-        filter: resolver.filter(is_typed(typed, "postprocess-dmaps"))?,
+        filter: resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?,
         depth_maps_only,
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion()?,

@@ -141,6 +141,7 @@ pub(crate) const BEYOND: &[&str] = &[
     "color-by-label",
     "report",
     "ply-layout",
+    "filter",
     "strict",
 ];
 

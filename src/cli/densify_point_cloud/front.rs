@@ -140,6 +140,7 @@ mod tests {
                     "label-consistency" => "strict".into(),
                     "missing-labels" | "unknown-label" => "void".into(),
                     "ply-layout" => "plain".into(),
+                    "filter" => "unbiased".into(),
                     _ => "1".into(),
                 });
             }

@@ -5,6 +5,7 @@ use super::log::Log;
 use super::{help, refusals};
 use crate::cli::duration::Moment;
 use crate::cli::listen::Recorder;
+use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::values::{openmvs_path, under, with_suffix};
 use crate::error::{Error, Result};
@@ -125,7 +126,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() },
         stereo: resolver.stereo()?,
-        filter: resolver.filter(typing.has("postprocess-dmaps"))?,
+        filter: resolver.filter(typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
         depth_maps_only: shared.estimation.fusion_mode == 1,
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion()?,
