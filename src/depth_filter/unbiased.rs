@@ -20,7 +20,7 @@ pub struct UnbiasedFilterOptions {
     /// Neighbours that must confirm a depth; lowered to the number of neighbours. Default 1.
     pub min_confirming: u32,
     /// Contradicting neighbours (those that see through the point) that one confirming neighbour makes up for.
-    /// Default 1.
+    /// Default 0.5.
     pub contradictions_per_confirmation: f32,
     /// Neighbours that take part, best first, at most 255. Default 8.
     pub max_neighbors: u32,
@@ -31,7 +31,7 @@ impl Default for UnbiasedFilterOptions {
         UnbiasedFilterOptions {
             max_depth_diff: 0.01,
             min_confirming: 1,
-            contradictions_per_confirmation: 1.0,
+            contradictions_per_confirmation: 0.5,
             max_neighbors: 8,
         }
     }
