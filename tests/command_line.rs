@@ -3,6 +3,7 @@
 mod common;
 
 use common::{DENSIFY, SEMVS, Scratch};
+use semvs_formats::mvs::{ArchiveKind, Container, Image, SceneFile};
 use std::path::Path;
 
 /// Options under which nothing is estimated: the maps that exist are fused as they are.
@@ -140,7 +141,7 @@ fn every_option_of_openmvs_works_in_all_spellings() {
     let values = [
         ("working-folder", "."),
         ("config-file", "my.cfg"),
-        ("archive-type", "-1"),
+        ("archive-type", "3"),
         ("process-priority", "-1"),
         ("max-threads", "3"),
         ("verbosity", "3"),
@@ -198,6 +199,48 @@ fn output_names_are_openmvs_own() {
         let logs = scratch.files().iter().filter(|f| f.starts_with("DensifyPointCloud-")).count();
         assert_eq!(logs, 1);
     }
+}
+
+#[test]
+fn project_archives_hold_the_dense_cloud_as_openmvs_stores_it() {
+    let folder = common::facade6().join("openmvs-2.3.0");
+    for (kind, reference) in [(0, "archive3"), (1, "archive3"), (2, "archive2"), (3, "archive3")] {
+        let scratch = with_maps();
+        scratch.densify_point_cloud(&format!("scene.mvs --archive-type {kind} {FUSE_ONLY}")).ok();
+        let limits = semvs_formats::Limits::default();
+        let ours = SceneFile::read(scratch.path("scene_dense.mvs"), &limits).unwrap();
+        let theirs = SceneFile::read(folder.join(reference).join("scene_dense.mvs"), &limits).unwrap();
+        assert_eq!(ours.container, Container::Project { kind: ArchiveKind::ALL[kind] });
+        let (ours, theirs) = (ours.scene, theirs.scene);
+        assert_eq!(ours.platforms.len(), theirs.platforms.len());
+        assert_eq!(ours.platforms[0].name, theirs.platforms[0].name);
+        assert_eq!(ours.platforms[0].poses, theirs.platforms[0].poses);
+        for (a, b) in ours.images.iter().zip(&theirs.images) {
+            assert_eq!((&a.name, a.id, a.width, a.height), (&b.name, b.id, b.width, b.height));
+            let order = |image: &Image| image.view_scores.iter().map(|s| s.image).collect::<Vec<_>>();
+            assert_eq!(order(a), order(b));
+        }
+        assert_eq!(ours.points.views.images, theirs.points.views.images);
+        assert_eq!(ours.points.colors.len(), theirs.points.colors.len());
+        let header = scratch.read("scene_dense.ply");
+        let header = String::from_utf8_lossy(&header[..400]).into_owned();
+        assert!(header.contains("property float32 nx") && !header.contains("list"), "{header}");
+    }
+}
+
+#[test]
+fn opendronemaps_point_filter_can_read_its_layout() {
+    let scratch = with_maps();
+    scratch.densify_point_cloud(&format!("scene.mvs --ply-layout odm {FUSE_ONLY}")).ok();
+    let bytes = scratch.read("scene_dense.ply");
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap();
+    let header = String::from_utf8_lossy(&bytes[..end]).into_owned();
+    let columns = ["float32 x", "float32 y", "float32 z", "uint8 red", "uint8 green", "uint8 blue"];
+    let columns = columns.iter().chain(&["float32 nx", "float32 ny", "float32 nz", "uint8 views"]);
+    let columns: String = columns.map(|c| format!("property {c}\n")).collect();
+    let expected = format!("ply\nformat binary_little_endian 1.0\nelement vertex {POST7_POINTS}\n{columns}");
+    assert_eq!(header, expected);
+    assert!(bytes[end + 11..].chunks(28).all(|point| point[27] >= 3));
 }
 
 #[test]

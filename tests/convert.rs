@@ -1,7 +1,7 @@
 //! Depth maps to clouds without fusion, on the bundled scene.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use semvs::pipeline::{ConvertJob, LabelJob, Outputs, convert};
+use semvs::pipeline::{ConvertJob, LabelJob, Outputs, SceneArchive, convert};
 use semvs::progress::Progress;
 use semvs::semantics::ClassRules;
 use semvs::store::cloud::PlyLayout;
@@ -39,6 +39,7 @@ fn job(depth_maps: Vec<PathBuf>, labels: Option<LabelJob>, cloud: &Path) -> Conv
     let outputs = Outputs {
         cloud: cloud.to_owned(),
         scene: None,
+        archive: SceneArchive::Interface,
         layout: PlyLayout::Plain,
         split_by_class: false,
         color_by_label: false,

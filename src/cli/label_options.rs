@@ -47,7 +47,8 @@ pub(crate) struct LabelOutput {
     /// Write a summary of the run as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
-    /// "plain": no lists, opens everywhere; "openmvs": with the views of every point
+    /// What the cloud holds of every point besides its label [default: plain in semvs, openmvs in
+    /// DensifyPointCloud]
     #[arg(long, value_name = "LAYOUT", value_enum)]
     pub(crate) ply_layout: Option<PlyLayout>,
 }
@@ -84,8 +85,10 @@ pub(crate) enum WhenMissing {
 /// `--ply-layout`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PlyLayout {
-    /// position, colour, normal, label
+    /// position, colour, normal: opens everywhere
     Plain,
-    /// and lists of views and weights, as OpenMVS writes them
+    /// and lists of views and weights, as OpenMVS's other programs need them
     Openmvs,
+    /// the columns of OpenDroneMap's point filter: with the number of views, without label
+    Odm,
 }

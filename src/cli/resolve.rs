@@ -266,6 +266,7 @@ pub(crate) fn typed_layout(typed: TypedLayout) -> PlyLayout {
     match typed {
         TypedLayout::Plain => PlyLayout::Plain,
         TypedLayout::Openmvs => PlyLayout::OpenMvs,
+        TypedLayout::Odm => PlyLayout::Odm,
     }
 }
 

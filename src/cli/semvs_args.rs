@@ -136,7 +136,7 @@ pub(crate) struct ConvertArgs {
     /// Also write the cloud in the colours of its classes: OUT.labels.ply
     #[arg(long)]
     pub(crate) color_by_label: bool,
-    /// "plain": no lists, opens everywhere; "openmvs": with the view of every point
+    /// What the cloud holds of every point besides its label
     #[arg(long, value_name = "LAYOUT", value_enum, default_value_t = PlyLayout::Plain)]
     pub(crate) ply_layout: PlyLayout,
 }

@@ -5,7 +5,7 @@ use super::filter::filter_across_views;
 use super::fusing::{Fused, fuse_maps};
 use super::job::{DensifyJob, SceneJob};
 use super::outputs::{check_depth_maps, check_places, class_rows, cloud_rows, write_cloud, write_scene};
-use super::prepare::{Prepared, load, prepare};
+use super::prepare::{Prepared, load, pixels_in_hand, prepare};
 use super::record::{Clock, view_rows, with_threads};
 use super::sparse::SparseCloud;
 use crate::error::Result;
@@ -45,7 +45,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     clock.stage("load");
     let prepared = prepare(&job.input, loaded, cameras, true, progress)?;
     check_places(&job.outputs, prepared.labels.as_ref())?;
-    let store = depth_store(&job.input, &prepared, &job.depth_maps);
+    let store = caching_store(&job.input, &prepared, &job.depth_maps);
     check_depth_maps(&prepared, &store)?;
     clock.stage("prepare");
 
@@ -65,6 +65,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
         filter_across_views(&prepared, &store, &mapped, across, &job.filter.options, progress)?;
         clock.stage("filter");
     }
+    let store = plain_store(&prepared, &job.depth_maps);
     let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
     if job.depth_maps_only {
         finish_depth_maps(job, &prepared, &mapped, &clock, progress, &mut report)?;
@@ -94,11 +95,14 @@ fn depth_map_rows(prepared: &Prepared, store: &DepthStore, mapped: &[ViewIndex],
 }
 
 /// The store of a job's depth maps, with memory for what the threads work on at a time.
-pub(super) fn depth_store(job: &SceneJob, prepared: &Prepared, folder: &Path) -> DepthStore {
-    let pixels = prepared.cameras.iter().flatten().map(|c| c.size().area()).max().unwrap_or(0);
-    let in_hand = rayon::current_num_threads() * (1 + job.neighbors.number_views.max(8));
-    let cache = (in_hand * pixels * MAP_BYTES).clamp(MIN_MAP_CACHE, MAX_MAP_CACHE);
+fn caching_store(job: &SceneJob, prepared: &Prepared, folder: &Path) -> DepthStore {
+    let cache = (pixels_in_hand(job, &prepared.cameras) * MAP_BYTES).clamp(MIN_MAP_CACHE, MAX_MAP_CACHE);
     DepthStore::new(folder, prepared.loaded.search.clone(), cache, Limits::default())
+}
+
+/// The store of depth maps for fusion, which keeps what it needs itself.
+pub(super) fn plain_store(prepared: &Prepared, folder: &Path) -> DepthStore {
+    DepthStore::new(folder, prepared.loaded.search.clone(), 0, Limits::default())
 }
 
 fn finish_depth_maps(
@@ -120,7 +124,7 @@ fn finish_depth_maps(
         let written = write_cloud(&outputs, &SparseCloud(tracks), None, progress)?;
         report.outputs.extend(cloud_rows(&written, None));
     }
-    write_scene(&job.outputs, prepared, progress)?;
+    write_scene(&job.outputs, prepared, &SparseCloud(tracks), progress)?;
     report.outputs.extend(job.outputs.scene_row());
     Ok(())
 }
@@ -151,24 +155,26 @@ pub(super) fn write_results(
     report: &mut RunReport,
 ) -> Result<()> {
     let labels = prepared.labels.as_ref();
-    let written = if options.estimate_normals == AttributeSource::AfterFusion {
-        let centers: Vec<Vector3<f64>> = prepared
-            .loaded
-            .scene
-            .views
-            .iter()
-            .map(|v| v.calibration.as_ref().map_or_else(Vector3::zeros, |c| c.center))
-            .collect();
-        write_cloud(outputs, &WithNormals::estimate(&fused.cloud, &centers)?, labels, progress)?
-    } else {
-        write_cloud(outputs, &fused.cloud, labels, progress)?
+    let centers: Vec<Vector3<f64>> = prepared
+        .loaded
+        .scene
+        .views
+        .iter()
+        .map(|v| v.calibration.as_ref().map_or_else(Vector3::zeros, |c| c.center))
+        .collect();
+    let after_fusion = options.estimate_normals == AttributeSource::AfterFusion;
+    let with_normals = after_fusion.then(|| WithNormals::estimate(&fused.cloud, &centers)).transpose()?;
+    let cloud: &dyn PointSource = match &with_normals {
+        Some(cloud) => cloud,
+        None => &fused.cloud,
     };
+    let written = write_cloud(outputs, cloud, labels, progress)?;
     report.points = fused.cloud.len();
     report.outputs.extend(cloud_rows(&written, labels));
     if let Some(labels) = labels {
         report.classes = class_rows(&fused.summary, &written, labels);
     }
-    write_scene(outputs, prepared, progress)?;
+    write_scene(outputs, prepared, cloud, progress)?;
     report.outputs.extend(outputs.scene_row());
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Depth maps that exist to a cloud.
 
-use super::densify::{depth_store, write_results};
+use super::densify::{plain_store, write_results};
 use super::fusing::fuse_maps;
 use super::job::FuseJob;
 use super::outputs::check_places;
@@ -46,7 +46,7 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let mapped: Vec<ViewIndex> =
         mapped.into_iter().filter(|v| prepared.cameras[v.index()].is_some()).collect();
     check_places(&job.outputs, prepared.labels.as_ref())?;
-    let store = depth_store(&job.input, &prepared, &job.depth_maps);
+    let store = plain_store(&prepared, &job.depth_maps);
     clock.stage("prepare");
 
     let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };

@@ -11,8 +11,12 @@ use rayon::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Bytes of images of either kind that are kept.
-const CACHE_BYTES: usize = 192 << 20;
+/// Bytes of colours that are kept.
+const COLOR_CACHE: usize = 64 << 20;
+/// Least bytes of luma that are kept.
+const MIN_GRAY_CACHE: usize = 64 << 20;
+/// Most bytes of luma that are kept.
+const MAX_GRAY_CACHE: usize = 4 << 30;
 
 /// The photographs of a scene's views.
 #[derive(Debug)]
@@ -23,13 +27,14 @@ pub(super) struct Images {
 }
 
 impl Images {
-    /// The photographs of all views; nothing is read yet.
-    pub(super) fn new(loaded: &LoadedScene) -> Self {
+    /// The photographs of all views; nothing is read yet. Of those of `in_hand` bytes of luma, which the threads need
+    /// at a time, as many are kept as is reasonable.
+    pub(super) fn new(loaded: &LoadedScene, in_hand: usize) -> Self {
         let views = 0..loaded.scene.views.len();
         Images {
             paths: views.map(|i| loaded.image_path(ViewIndex(i as u32))).collect(),
-            grays: ByteCache::new(CACHE_BYTES),
-            colors: ByteCache::new(CACHE_BYTES),
+            grays: ByteCache::new(in_hand.clamp(MIN_GRAY_CACHE, MAX_GRAY_CACHE)),
+            colors: ByteCache::new(COLOR_CACHE),
         }
     }
 

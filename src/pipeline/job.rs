@@ -9,6 +9,7 @@ use crate::semantics::ClassRules;
 use crate::stereo::StereoOptions;
 use crate::store::cloud::PlyLayout;
 use crate::store::labels::LabelSources;
+use semvs_formats::mvs::ArchiveKind;
 use std::path::{Path, PathBuf};
 
 /// The scene and everything that is done before depth maps come into play.
@@ -152,6 +153,8 @@ pub struct Outputs {
     pub cloud: PathBuf,
     /// The scene with its neighbours.
     pub scene: Option<PathBuf>,
+    /// Archive that the scene is written as.
+    pub archive: SceneArchive,
     /// Properties of the points.
     pub layout: PlyLayout,
     /// One cloud per class.
@@ -162,6 +165,16 @@ pub struct Outputs {
     pub report: Option<PathBuf>,
     /// Write the sparse points as the cloud when only depth maps are wanted, as OpenMVS does.
     pub sparse_cloud: bool,
+}
+
+/// How a scene is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SceneArchive {
+    /// Interface archive with the sparse points.
+    #[default]
+    Interface,
+    /// Project archive with the dense points.
+    Project(ArchiveKind),
 }
 
 impl Outputs {

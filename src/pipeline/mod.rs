@@ -23,4 +23,6 @@ pub use convert::{ConvertJob, convert};
 pub use densify::{DEPTH_MAP, densify};
 pub use evaluate::{EvaluateJob, evaluate};
 pub use fuse::fuse;
-pub use job::{AcrossViews, DensifyJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob, SceneJob};
+pub use job::{
+    AcrossViews, DensifyJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob, SceneArchive, SceneJob,
+};

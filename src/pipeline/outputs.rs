@@ -1,6 +1,6 @@
 //! What a run writes at its end, and whether it can, asked at its start.
 
-use super::job::Outputs;
+use super::job::{Outputs, SceneArchive};
 use super::prepare::Prepared;
 use super::skip::Labels;
 use crate::error::Result;
@@ -12,7 +12,7 @@ use crate::semantics::ClassId;
 use crate::store::atomic::check_writable;
 use crate::store::cloud::{CloudOptions, WrittenClouds, check_cloud_paths, write_clouds};
 use crate::store::depth_store::DepthStore;
-use crate::store::export::{interface_archive, write_interface};
+use crate::store::export::{interface_archive, project_archive, write_interface, write_project};
 use std::time::Instant;
 
 /// Checks that everything can be written, creating missing folders.
@@ -64,15 +64,25 @@ pub(super) fn write_cloud(
     Ok(written)
 }
 
-/// Writes the scene with its neighbours.
+/// Writes the scene with its neighbours; a project archive holds the points of `cloud`.
 ///
 /// # Errors
 /// The file cannot be written.
-pub(super) fn write_scene(outputs: &Outputs, prepared: &Prepared, progress: &Progress) -> Result<()> {
+pub(super) fn write_scene(
+    outputs: &Outputs,
+    prepared: &Prepared,
+    cloud: &dyn PointSource,
+    progress: &Progress,
+) -> Result<()> {
     let Some(path) = &outputs.scene else { return Ok(()) };
     let start = Instant::now();
-    let archive = interface_archive(&prepared.loaded, &prepared.cameras, &prepared.neighbors);
-    write_interface(path, &archive)?;
+    let Prepared { loaded, cameras, neighbors, .. } = prepared;
+    match outputs.archive {
+        SceneArchive::Interface => write_interface(path, &interface_archive(loaded, cameras, neighbors))?,
+        SceneArchive::Project(kind) => {
+            write_project(path, &project_archive(loaded, cameras, neighbors, cloud)?, kind)?;
+        }
+    }
     progress.event(Event::SceneSaved { path: path.clone(), elapsed: start.elapsed() });
     Ok(())
 }

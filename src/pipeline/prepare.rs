@@ -4,6 +4,7 @@ use super::images::Images;
 use super::job::SceneJob;
 use super::skip::{Labels, Masks};
 use super::sparse::{override_from_file, replace_points};
+use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::progress::{Event, Progress};
@@ -96,7 +97,7 @@ pub(super) fn prepare(
     progress: &Progress,
 ) -> Result<Prepared> {
     let start = Instant::now();
-    let images = Images::new(&loaded);
+    let images = Images::new(&loaded, pixels_in_hand(job, &cameras) * size_of::<f32>());
     let mut dropped = header_drops(&loaded, &cameras);
     if decode {
         for (view, error) in images.check(&cameras, progress) {
@@ -123,6 +124,14 @@ pub(super) fn prepare(
     let prepared = Prepared { loaded, cameras, dropped, neighbors, images, masks, labels };
     report_pairs(&prepared, start, progress)?;
     Ok(prepared)
+}
+
+/// Pixels of the views that all threads work on at a time: each on a view and its neighbours.
+pub(super) fn pixels_in_hand(job: &SceneJob, cameras: &[Option<Camera>]) -> usize {
+    let pixels = cameras.iter().flatten().map(|c| c.size().area()).max().unwrap_or(0);
+    let neighbors =
+        if job.neighbors.number_views == 0 { job.neighbors.max_views } else { job.neighbors.number_views };
+    rayon::current_num_threads() * (1 + neighbors.max(MAX_NEIGHBORS)) * pixels
 }
 
 /// Why calibrated views have no camera.

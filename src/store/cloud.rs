@@ -18,6 +18,10 @@ pub enum PlyLayout {
     Plain,
     /// The same and lists of views and weights, as OpenMVS writes and needs them.
     OpenMvs,
+    /// Position, colour, normal, label under OpenMVS's type names: what it writes beside a project archive.
+    OpenMvsProject,
+    /// The only layout that OpenDroneMap's point filter reads; labels are left out.
+    Odm,
 }
 
 /// How a cloud is written, and what is written besides.
@@ -191,6 +195,14 @@ fn ply_layout(
     let colors = has.colors || label_colors;
     let mut layout = match options.layout {
         PlyLayout::Plain => ply::Layout::plain(colors, has.normals),
+        PlyLayout::OpenMvsProject => {
+            let plain = ply::Layout::plain(colors, has.normals);
+            ply::Layout { type_names: ply::TypeNames::Sized, ..plain }
+        }
+        PlyLayout::Odm if has.views && colors && has.normals => return Ok(ply::Layout::odm()),
+        PlyLayout::Odm => {
+            return Err(Error::invalid("--ply-layout odm needs colours, normals and views; use plain"));
+        }
         PlyLayout::OpenMvs if has.views => ply::Layout::openmvs(colors, has.normals, has.weights),
         PlyLayout::OpenMvs => {
             return Err(Error::invalid("these points have no views for --ply-layout openmvs; use plain"));

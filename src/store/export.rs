@@ -5,7 +5,7 @@ use super::import::LoadedScene;
 use super::paths::{SearchPath, clean_name, name_relative_to};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Roi};
-use crate::scene::{Neighbor, Scene, ViewNeighbors};
+use crate::scene::{Neighbor, PointSource, Scene, ViewNeighbors};
 use semvs_formats::mvs::{self, NEWEST_VERSION, NO_ID};
 use std::path::Path;
 
@@ -34,6 +34,57 @@ pub fn interface_archive(
         }
     }
     archive
+}
+
+/// The archive that OpenMVS leaves after densification in project mode: as [`interface_archive`], but with the dense
+/// `cloud` in place of the sparse points, platform names, and the working size of every processed image.
+///
+/// # Errors
+/// Those of `cloud`.
+pub fn project_archive(
+    loaded: &LoadedScene,
+    cameras: &[Option<Camera>],
+    neighbors: &[ViewNeighbors],
+    cloud: &dyn PointSource,
+) -> Result<mvs::Scene> {
+    let mut archive = interface_archive(loaded, cameras, neighbors);
+    for (platform, stored) in archive.platforms.iter_mut().zip(&loaded.archive.platforms) {
+        platform.name.clone_from(&stored.name);
+    }
+    for (image, camera) in archive.images.iter_mut().zip(cameras) {
+        let size = camera.as_ref().map(Camera::size).unwrap_or_default();
+        (image.width, image.height) = (size.width, size.height);
+    }
+    let has = cloud.layout();
+    let mut points = mvs::PointCloud::default();
+    let mut images = Vec::new();
+    cloud.for_each(&mut |point| {
+        points.positions.push(point.position);
+        if has.normals {
+            points.normals.push(point.normal);
+        }
+        if has.colors {
+            points.colors.push(point.color);
+        }
+        if has.views {
+            images.clear();
+            images.extend(point.views.iter().map(|v| v.0));
+            points.views.push(&images, point.weights);
+        }
+        Ok(())
+    })?;
+    archive.points = points;
+    Ok(archive)
+}
+
+/// Writes a project archive, whole or not at all.
+///
+/// # Errors
+/// [`Error`] if the place cannot be written or the archive has an index out of range.
+pub fn write_project(path: &Path, archive: &mvs::Scene, kind: mvs::ArchiveKind) -> Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    mvs::write_project(&mut file, archive, kind).map_err(|e| Error::format(path, e))?;
+    file.commit()
 }
 
 /// Writes an interface archive of the newest version, whole or not at all.

@@ -4,7 +4,7 @@ use super::{cloud_path, conclude};
 use crate::cli::resolve;
 use crate::cli::semvs_args::ConvertArgs;
 use crate::error::Result;
-use crate::pipeline::{self, ConvertJob, Outputs};
+use crate::pipeline::{self, ConvertJob, Outputs, SceneArchive};
 use crate::progress::Progress;
 use std::path::Path;
 
@@ -18,6 +18,7 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
         outputs: Outputs {
             cloud: cloud_path(&args.output)?,
             scene: None,
+            archive: SceneArchive::Interface,
             layout: resolve::typed_layout(args.ply_layout),
             split_by_class: args.split_by_class,
             color_by_label: args.color_by_label,

@@ -6,7 +6,7 @@ use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::DensifyArgs;
 use crate::error::{Error, Result};
-use crate::pipeline::{self, DensifyJob, Outputs};
+use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
 use crate::store::cloud::PlyLayout;
 use clap::ArgMatches;
 use std::path::{Path, PathBuf};
@@ -61,6 +61,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         outputs: Outputs {
             cloud,
             scene: Some(scene),
+            archive: SceneArchive::Interface,
             layout: resolve::layout(&shared.labels.output, PlyLayout::Plain),
             split_by_class: shared.labels.output.split_by_class,
             color_by_label: shared.labels.output.color_by_label,

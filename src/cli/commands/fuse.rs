@@ -5,7 +5,7 @@ use crate::cli::listen::Recorder;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::FuseArgs;
 use crate::error::Result;
-use crate::pipeline::{self, FuseJob, Outputs};
+use crate::pipeline::{self, FuseJob, Outputs, SceneArchive};
 use crate::store::cloud::PlyLayout;
 use clap::ArgMatches;
 use std::path::{Path, PathBuf};
@@ -47,6 +47,7 @@ fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<F
         outputs: Outputs {
             cloud: args.output.as_deref().map_or_else(|| Ok(default_cloud(&args.scene)), cloud_path)?,
             scene: None,
+            archive: SceneArchive::Interface,
             layout: resolve::layout(&shared.labels.output, PlyLayout::Plain),
             split_by_class: shared.labels.output.split_by_class,
             color_by_label: shared.labels.output.color_by_label,

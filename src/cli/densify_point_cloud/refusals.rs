@@ -10,9 +10,9 @@ pub(crate) fn check(args: &DropInArgs) -> Result<(), String> {
     let actions = &args.actions;
     let refusals = [
         (
-            args.archive_type != -1,
+            !(-1..=3).contains(&args.archive_type),
             "--archive-type",
-            "only interface archives (-1) are written; leave the option out",
+            "give -1 (interface), 0 (text), 1 (binary), 2 (zlib) or 3 (zstd)",
         ),
         (
             !matches!(args.shared.estimation.fusion_mode, 0 | 1),
@@ -62,7 +62,8 @@ mod tests {
     #[test]
     fn refusals_name_the_option() {
         for word in [
-            "--archive-type=3",
+            "--archive-type=4",
+            "--archive-type=-2",
             "--fusion-mode=-1",
             "--fusion-mode=-2",
             "--estimate-scale=1",
@@ -86,6 +87,6 @@ mod tests {
         let harmless =
             ["--cuda-device=-2", "--process-priority=0", "--tower-mode=4", "--filter-point-cloud=20"];
         assert_eq!(checked(&harmless), Ok(()));
-        assert_eq!(checked(&["--archive-type=-1", "--sub-scene-area=0", "--fusion-mode=1"]), Ok(()));
+        assert_eq!(checked(&["--archive-type=3", "--sub-scene-area=0", "--fusion-mode=1"]), Ok(()));
     }
 }

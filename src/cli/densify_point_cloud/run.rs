@@ -9,11 +9,12 @@ use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::values::{openmvs_path, under, with_suffix};
 use crate::error::{Error, Result};
-use crate::pipeline::{self, DensifyJob, Outputs};
+use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
 use crate::progress::Progress;
 use crate::report::{RunReport, class_table};
 use crate::store::atomic::{create_folder, write_file};
 use crate::store::cloud::PlyLayout;
+use semvs_formats::mvs::ArchiveKind;
 use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -115,6 +116,13 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
     if base.file_name().is_none() {
         return Err(Error::content(&base, "--output-file: give a file name"));
     }
+    let (archive, layout) = match usize::try_from(args.archive_type).ok() {
+        Some(kind) => match ArchiveKind::ALL.get(kind) {
+            Some(&kind) => (SceneArchive::Project(kind), PlyLayout::OpenMvsProject),
+            None => return Err(Error::invalid(format!("--archive-type {kind}: give -1 to 3"))),
+        },
+        None => (SceneArchive::Interface, PlyLayout::OpenMvs),
+    };
     let mut scene = resolver.scene(input, folder.to_owned())?;
     if let Some(masks) = &mut scene.masks {
         // Unlike all others this path is relative to the current folder.
@@ -133,7 +141,8 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         outputs: Outputs {
             cloud: with_suffix(&base, ".ply"),
             scene: Some(with_suffix(&base, ".mvs")),
-            layout: resolve::layout(outputs, PlyLayout::OpenMvs),
+            archive,
+            layout: resolve::layout(outputs, layout),
             split_by_class: outputs.split_by_class,
             color_by_label: outputs.color_by_label,
             report: outputs.report.as_deref().map(|path| under(folder, &openmvs_path(path))),
