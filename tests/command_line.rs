@@ -81,6 +81,7 @@ fn mistakes_on_the_command_line_are_one_line_and_exit_code_1() {
         ("densify s.mvs --estimate-roi 3", "--estimate-roi"),
         ("densify s.mvs --postprocess-dmaps 8", "--postprocess-dmaps"),
         ("densify s.mvs --fusion-mode -1", "--fusion-mode"),
+        ("densify s.mvs --tower-mode -4", "--tower-mode"),
         ("densify s.mvs --ignore-mask-label 70000", "--ignore-mask-label"),
     ] {
         scratch.semvs(words).fails_naming(&[needle]);
@@ -120,7 +121,7 @@ fn what_is_not_available_is_refused_by_name_before_work() {
         "--sample-mesh -100",
         "--filter-point-cloud -20",
         "--export-number-views 3",
-        "--tower-mode 1",
+        "--tower-mode -1",
         "--mesh-file m.ply",
         "--export-depth-maps-name x",
     ] {

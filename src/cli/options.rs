@@ -116,6 +116,9 @@ pub(crate) struct RoiOptions {
     /// Border of the region: above 0 its size is multiplied by this, below 0 its half size grows by the amount
     #[arg(long, value_name = "B", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) roi_border: f32,
+    /// Cameras that climb a tower: 0 = do not look for them, 1 to 4 = say so; no points are made up for them
+    #[arg(long, value_name = "MODE", default_value_t = 4, allow_negative_numbers = true)]
+    pub(crate) tower_mode: i32,
     /// Drop the points outside the region
     #[arg(long, value_name = "0|1", default_value = "1", value_parser = boolean, action = clap::ArgAction::Set)]
     pub(crate) crop_to_roi: bool,

@@ -46,6 +46,11 @@ impl<'a> Resolver<'a> {
     /// A value out of range; options that need labels without labels.
     pub(crate) fn scene(&self, scene: PathBuf, working_folder: PathBuf) -> Result<SceneJob> {
         let images = &self.options.images;
+        let tower_mode = self.options.roi.tower_mode;
+        if !(0..=4).contains(&tower_mode) {
+            let what = "points of a tower are not made up; use 0, or 1 to 4, which only look for one";
+            return Err(Error::invalid(format!("--tower-mode {tower_mode} is refused: {what}")));
+        }
         let path = |typed: &Option<PathBuf>| typed.as_deref().map(self.place);
         Ok(SceneJob {
             scene,
@@ -56,6 +61,7 @@ impl<'a> Resolver<'a> {
             roi: self.roi()?,
             masks: masks(images.ignore_mask_label, images.mask_path.clone())?,
             labels: labels(&self.options.labels.input, self.place)?,
+            look_for_tower: tower_mode > 0,
             strict: self.options.run.strict,
             max_threads: self.options.run.max_threads as usize,
         })

@@ -27,6 +27,8 @@ pub struct SceneJob {
     pub neighbors: NeighborOptions,
     /// Region of interest.
     pub roi: RoiJob,
+    /// Say it if the cameras climb a tower, for which OpenMVS would make up points.
+    pub look_for_tower: bool,
     /// Masks, if they are used.
     pub masks: Option<MaskJob>,
     /// Labels, if they are used.

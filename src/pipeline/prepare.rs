@@ -8,7 +8,7 @@ use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::progress::{Event, Progress};
-use crate::scene::{ImageId, ViewIndex, ViewNeighbors, estimate_roi, select_neighbors};
+use crate::scene::{ImageId, ViewIndex, ViewNeighbors, estimate_roi, looks_like_tower, select_neighbors};
 use crate::store::import::{LoadedScene, load_scene};
 use semvs_formats::Limits;
 use std::time::Instant;
@@ -77,6 +77,12 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     });
     if scene.roi.is_none() {
         scene.roi = estimate_roi(scene, job.roi.estimate);
+    }
+    if job.look_for_tower && looks_like_tower(scene) {
+        progress.warn(
+            "the cameras climb as around a tower: OpenMVS would make up points of a cylinder here (--tower-mode), which \
+             is not done",
+        );
     }
     if let Some(path) = &job.view_neighbors_file {
         override_from_file(scene, path)?;

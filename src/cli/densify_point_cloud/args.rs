@@ -60,9 +60,6 @@ pub(crate) struct Actions {
     /// Export points with this many views and exit: not available
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub(crate) export_number_views: i32,
-    /// Towers are never looked for: 0 and 4 are accepted, other modes are not available
-    #[arg(long, value_name = "MODE", default_value_t = 4, allow_negative_numbers = true)]
-    pub(crate) tower_mode: i32,
     /// Mesh that neighbours are derived from: not available
     #[arg(long, value_name = "FILE", hide = true)]
     pub(crate) mesh_file: Option<PathBuf>,

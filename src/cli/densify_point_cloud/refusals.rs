@@ -32,11 +32,6 @@ pub(crate) fn check(args: &DropInArgs) -> Result<(), String> {
             "--export-number-views",
             "exporting points by their number of views is not available",
         ),
-        (
-            !matches!(actions.tower_mode, 0 | 4),
-            "--tower-mode",
-            "towers are not looked for; use 0, or 4 which finds none",
-        ),
         (actions.mesh_file.is_some(), "--mesh-file", "meshes are not read"),
         (
             actions.export_depth_maps_name.is_some(),
@@ -71,7 +66,6 @@ mod tests {
             "--sample-mesh=-5",
             "--filter-point-cloud=-20",
             "--export-number-views=3",
-            "--tower-mode=2",
             "--mesh-file=m.ply",
             "--export-depth-maps-name=x",
         ] {
