@@ -5,12 +5,12 @@ use crate::stereo::cost::math::exp;
 use crate::stereo::level::Level;
 use crate::stereo::tile::{Patch, REACH, TAPS, TILE_H, TILE_W, Tile, WIN_H, WIN_W, WinRow};
 
-/// −1 / (2 σ²) of the grey-level difference, σ = 0.1 of the range.
-const GREY_FALLOFF: f32 = -50.0 / (255.0 * 255.0);
+/// −1 / (2 σ²) of the grey-level difference, σ = 0.068 of the range.
+const GREY_FALLOFF: f32 = -109.0 / (255.0 * 255.0);
 /// −1 / (2 σ²) of the distance in pixels, σ = 3.
 const SPACE_FALLOFF: f32 = -1.0 / 18.0;
 /// How fast the prior from the coarser level fades with texture.
-const PRIOR_FALLOFF: f32 = -50.0 / (255.0 * 255.0);
+const PRIOR_FALLOFF: f32 = -109.0 / (255.0 * 255.0);
 
 /// Bilateral weights and patch statistics of every pixel of the tile.
 #[inline(always)]
