@@ -5,7 +5,11 @@ use super::problem::StereoProblem;
 use super::state::State;
 use crate::scene::{DepthEstimate, Grid};
 
-/// Depth, normal and confidence of every pixel whose cost is below `keep_cost`; confidence = 1 − cost, at least 0.
+/// Depth, normal and confidence of every pixel whose matching cost is below `keep_cost`.
+///
+/// Confidence is `(1 − cost)⁴` of the evidence alone: smoothness and the prior from coarser levels chose the
+/// hypothesis, but do not vouch for it. The power makes averages over views lean on the sharpest of them: the share of
+/// depths within 0.1 % falls fast with the cost, and the error of a mean is governed by its worst members.
 pub(crate) fn finish(problem: &StereoProblem, level: &Level, state: &State, keep_cost: f32) -> DepthEstimate {
     let size = level.size;
     let mut depth = Grid::filled(size, 0.0f32);
@@ -16,13 +20,13 @@ pub(crate) fn finish(problem: &StereoProblem, level: &Level, state: &State, keep
         for x in 0..size.width as usize {
             let at = state.at(x as i32, y as i32);
             let d = 1.0 / state.w[at];
-            let cost = state.total[at];
+            let cost = state.cost[at];
             if state.active[at] < 0.5 || !(cost < keep_cost) || !(d >= low && d < high) {
                 continue;
             }
             depth[(x, y)] = d;
             normal[(x, y)] = level.pinhole.normal(state.plane(at), x as f32, y as f32);
-            confidence[(x, y)] = (1.0 - cost).clamp(0.0, 1.0);
+            confidence[(x, y)] = sharpened(cost);
         }
     }
     DepthEstimate {
@@ -34,5 +38,21 @@ pub(crate) fn finish(problem: &StereoProblem, level: &Level, state: &State, keep
         depth,
         normal: Some(normal),
         confidence: Some(confidence),
+    }
+}
+
+/// Confidence of a matching cost.
+fn sharpened(cost: f32) -> f32 {
+    let c = (1.0 - cost).clamp(0.0, 1.0);
+    (c * c) * (c * c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sharpened;
+
+    #[test]
+    fn confidence_falls_from_one_to_zero() {
+        assert_eq!([sharpened(0.0), sharpened(0.5), sharpened(1.0), sharpened(1.2)], [1.0, 0.0625, 0.0, 0.0]);
     }
 }

@@ -39,7 +39,7 @@ const RELAXED: f32 = 4.0 / 3.0;
 /// Estimates depth, normals and confidence of the reference view by photometric matching.
 ///
 /// Depths are in scene units along the reference's optical axis, normals in its camera frame, confidence is
-/// 1 − cost. The result depends on the problem and the options alone. If geometric passes follow
+/// (1 − cost)⁴. The result depends on the problem and the options alone. If geometric passes follow
 /// (`options.geometric_iterations > 0`) the threshold on the cost is relaxed by a third.
 ///
 /// # Errors
