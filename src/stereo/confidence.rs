@@ -21,7 +21,8 @@ pub(crate) fn finish(problem: &StereoProblem, level: &Level, state: &State, keep
             let at = state.at(x as i32, y as i32);
             let d = 1.0 / state.w[at];
             let cost = state.cost[at];
-            if state.active[at] < 0.5 || !(cost < keep_cost) || !(d >= low && d < high) {
+            let kept = state.active[at] > 0.5 && cost < keep_cost && d >= low && d < high;
+            if !kept {
                 continue;
             }
             depth[(x, y)] = d;

@@ -129,7 +129,7 @@ pub fn refine_geometric(
         Pass {
             key: 0x8000_0000 | pass as u32,
             iteration: 1 + pass as u32,
-            shift: if pass % 2 == 0 { 2 } else { 3 },
+            shift: if pass.is_multiple_of(2) { 2 } else { 3 },
             candidates: options.candidates as usize,
             random: 0,
             random_if_bad: 0,

@@ -139,7 +139,7 @@ impl<'a> Solver<'a> {
         let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k)) else {
             return;
         };
-        let radius = if k % 2 == 0 { 3 } else { 5 };
+        let radius = if k.is_multiple_of(2) { 3 } else { 5 };
         if cost <= 1.0
             && let Some(p) = candidates::fitted(self.level, &self.tile, x, y, radius)
         {

@@ -14,7 +14,7 @@ pub(super) fn exp(x: f32) -> f32 {
     p = p * f + 0.009_618_129;
     p = p * f + 0.055_504_11;
     p = p * f + 0.240_226_5;
-    p = p * f + 0.693_147_2;
+    p = p * f + std::f32::consts::LN_2;
     p = p * f + 1.0;
     let n = shifted.to_bits().wrapping_sub(MAGIC_BITS);
     p * f32::from_bits(n.wrapping_add(127) << 23)

@@ -46,7 +46,7 @@ fn direct_cost(
                 });
                 let t = level_at(x + dx, y + dy);
                 let weight =
-                    (-50.0 * ((t - centre) / 255.0).powi(2) - f64::from(dx * dx + dy * dy) / 18.0).exp();
+                    (-109.0 * ((t - centre) / 255.0).powi(2) - f64::from(dx * dx + dy * dy) / 18.0).exp();
                 texels.push((weight, t, bilinear(&image.gray, q[0] / q[2], q[1] / q[2])));
             }
         }

@@ -2,6 +2,8 @@
 //!
 //! No fused multiply-add and no reassociation: the same bytes come out at every instruction-set level.
 
+#![expect(clippy::needless_range_loop, reason = "x counts the pixels of several rows at once")]
+
 mod correlation;
 mod geometric;
 mod patch;
@@ -33,7 +35,8 @@ fn cut(row: &WinRow, at: usize) -> &Row {
 #[inline(always)]
 pub(in crate::stereo::cost) fn try_plane(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
     let (low, high) = level.w_range;
-    if !(plane.w >= low * 0.5 && plane.w <= high * 2.0) || !data_cost(tile, level, plane) {
+    let thinkable = plane.w >= low * 0.5 && plane.w <= high * 2.0;
+    if !thinkable || !data_cost(tile, level, plane) {
         return false;
     }
     smooth_candidate(&tile.halo, &mut tile.scratch, level, tile.x0, tile.y0, plane);
