@@ -191,3 +191,27 @@ fn a_run_leaves_its_results_and_nothing_else() {
     let dense = cloud(&scratch, "scene_dense.ply");
     assert!(dense.has_views() && dense.len() > 1000);
 }
+
+#[test]
+fn sparse_points_and_neighbours_come_from_files_when_given() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", ".");
+    scratch.densify_point_cloud(&format!("scene.mvs {FUSE_ONLY}")).ok();
+    let given = format!("scene.mvs -p scene_dense.ply --fusion-mode 1 {FUSE_ONLY} -o given");
+    let out = scratch.densify_point_cloud(&given).ok();
+    assert!(out.stdout.contains("\t24171 points"), "{}", out.stdout);
+    scratch.semvs(&format!("densify scene.mvs {FUSE_ONLY} -o plain.ply")).ok();
+    let plain = scratch.densify_point_cloud(&given.replace("scene_dense.ply", "plain.ply"));
+    plain.fails_naming(&["plain.ply", "view_indices"]);
+
+    scratch.write("nb.txt", "0 3\n1 2 0\n");
+    let out = scratch
+        .semvs(&format!("densify scene.mvs {FUSE_ONLY} -o nb.ply --view-neighbors-file nb.txt -vv"))
+        .ok();
+    assert!(out.stderr.contains("Image 0000 is matched with 0003\n"), "{}", out.stderr);
+    assert!(out.stderr.contains("Image 0001 is matched with 0002 0000\n"), "{}", out.stderr);
+    scratch.write("nb.txt", "0 77\n");
+    scratch
+        .semvs(&format!("densify scene.mvs {FUSE_ONLY} -o nb.ply --view-neighbors-file nb.txt"))
+        .fails_naming(&["nb.txt", "77"]);
+}

@@ -5,6 +5,7 @@ use crate::progress::{Event, Listener, Stage};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 /// How much is said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,13 +42,24 @@ pub(crate) struct Console {
     /// Bars are drawn; otherwise every tenth of a stage gets a line.
     draw: bool,
     current: Mutex<Option<(Stage, ProgressBar)>>,
+    /// When the last line about steps was printed.
+    last_line: Mutex<Option<Instant>>,
 }
+
+/// Least time between two lines about the steps of a stage.
+const LINE_INTERVAL: Duration = Duration::from_secs(2);
 
 impl Console {
     /// Says what `level` asks for; bars are for terminals.
     pub(crate) fn new(level: Level) -> Self {
         let draw = std::io::stderr().is_terminal() && level >= Level::Info;
-        Console { level, bars: MultiProgress::new(), draw, current: Mutex::new(None) }
+        Console {
+            level,
+            bars: MultiProgress::new(),
+            draw,
+            current: Mutex::default(),
+            last_line: Mutex::default(),
+        }
     }
 
     fn say(&self, level: Level, text: &str) {
@@ -57,6 +69,17 @@ impl Console {
                 let _ = writeln!(std::io::stderr(), "{text}");
             });
         }
+    }
+
+    /// Whether it is time for another line; the first one of a stage waits too.
+    fn is_due(&self) -> bool {
+        let mut last = self.last_line.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let now = Instant::now();
+        let due = now.duration_since(*last.get_or_insert(now)) >= LINE_INTERVAL;
+        if due {
+            *last = Some(now);
+        }
+        due
     }
 
     fn draw_steps(&self, stage: Stage, done: usize, total: usize) {
@@ -117,14 +140,14 @@ impl Listener for Console {
     fn steps(&self, stage: Stage, done: usize, total: usize) {
         if self.draw {
             self.draw_steps(stage, done, total);
-        } else if begins_a_tenth(done, total) {
+        } else if begins_a_tenth(done, total) && (done == total || self.is_due()) {
             self.say(Level::Info, &format!("{}: {done} of {total}", name(stage)));
         }
     }
 }
 
 fn line(event: &Event) -> String {
-    let time = |elapsed: &std::time::Duration| duration::text(*elapsed);
+    let time = |elapsed: &Duration| duration::text(*elapsed);
     match event {
         Event::Warning(text) | Event::Info(text) | Event::Detail(text) => text.clone(),
         Event::SceneLoaded { images, calibrated, points, elapsed } => {

@@ -1,6 +1,6 @@
 //! `semvs convert`.
 
-use super::{cloud_path, conclude};
+use super::cloud_path;
 use crate::cli::resolve;
 use crate::cli::semvs_args::ConvertArgs;
 use crate::error::Result;
@@ -26,5 +26,6 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
             sparse_cloud: false,
         },
     };
-    conclude(&pipeline::convert(&job, progress)?, None)
+    crate::cli::print(&pipeline::convert(&job, progress)?.summary());
+    Ok(())
 }

@@ -1,30 +1,21 @@
 //! `semvs densify`.
 
-use super::{cloud_path, conclude, default_cloud, is_typed, options_in_effect};
+use super::{cloud_path, conclude, default_cloud, is_typed, outputs, resolver};
 use crate::cli::listen::Recorder;
 use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::DensifyArgs;
 use crate::error::{Error, Result};
-use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
-use crate::store::cloud::PlyLayout;
+use crate::pipeline::{self, DensifyJob};
 use clap::ArgMatches;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Runs the command.
 pub(crate) fn densify(args: &DensifyArgs, typed: &ArgMatches, recorder: &Arc<Recorder>) -> Result<()> {
-    let as_typed = |path: &Path| path.to_owned();
-    let resolver = Resolver::new(&args.shared, &as_typed)?;
-    let progress = recorder.progress();
-    resolver.remarks.iter().for_each(|remark| progress.warn(remark.as_str()));
-    let job = job(args, typed, &resolver)?;
-    let mut report = pipeline::densify(&job, resolve::cpu()?, &progress)?;
-    report.program = "semvs densify".to_owned();
-    report.version = env!("CARGO_PKG_VERSION").to_owned();
-    report.options = options_in_effect(typed);
-    report.warnings = recorder.warnings();
-    conclude(&report, job.outputs.report.as_deref())
+    let job = job(args, typed, &resolver(&args.shared, recorder)?)?;
+    let report = pipeline::densify(&job, resolve::cpu()?, &recorder.progress())?;
+    conclude(report, "semvs densify", typed, recorder, job.outputs.report.as_deref())
 }
 
 fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<DensifyJob> {
@@ -58,16 +49,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         depth_maps_only,
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion()?,
-        outputs: Outputs {
-            cloud,
-            scene: Some(scene),
-            archive: SceneArchive::Interface,
-            layout: resolve::layout(&shared.labels.output, PlyLayout::Plain),
-            split_by_class: shared.labels.output.split_by_class,
-            color_by_label: shared.labels.output.color_by_label,
-            report: shared.labels.output.report.clone(),
-            sparse_cloud: false,
-        },
+        outputs: outputs(&shared.labels.output, cloud, Some(scene)),
     })
 }
 

@@ -12,14 +12,20 @@ pub(crate) use evaluate::evaluate;
 pub(crate) use fuse::fuse;
 pub(crate) use inspect::inspect;
 
+use super::label_options::LabelOutput;
+use super::listen::Recorder;
+use super::options::SharedOptions;
+use super::resolve::{self, Resolver};
 use crate::error::{Error, Result};
-use crate::pipeline::DEPTH_MAP;
+use crate::pipeline::{DEPTH_MAP, Outputs, SceneArchive};
 use crate::report::{OutputReport, RunReport};
 use crate::store::atomic::write_file;
+use crate::store::cloud::PlyLayout;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The cloud that `-o` names: `.ply` is added to a name without extension.
 fn cloud_path(typed: &Path) -> Result<PathBuf> {
@@ -52,14 +58,54 @@ pub(crate) fn options_in_effect(matches: &ArgMatches) -> Map<String, Value> {
     options
 }
 
-/// Prints the summary and writes the report.
-pub(crate) fn conclude(report: &RunReport, path: Option<&Path>) -> Result<()> {
-    if let Some(path) = path {
-        let text = report.to_json().map_err(|e| Error::content(path, format!("no JSON: {e}")))?;
-        write_file(path, text.as_bytes())?;
+/// Options whose paths are relative to the current folder, with remarks about the dense config file as warnings.
+fn resolver<'a>(options: &'a SharedOptions, recorder: &Arc<Recorder>) -> Result<Resolver<'a>> {
+    let resolver = Resolver::new(options, &Path::to_path_buf)?;
+    let progress = recorder.progress();
+    resolver.remarks.iter().for_each(|remark| progress.warn(remark.as_str()));
+    Ok(resolver)
+}
+
+/// What to write for the options about labelled outputs.
+fn outputs(typed: &LabelOutput, cloud: PathBuf, scene: Option<PathBuf>) -> Outputs {
+    Outputs {
+        cloud,
+        scene,
+        archive: SceneArchive::Interface,
+        layout: resolve::layout(typed, PlyLayout::Plain),
+        split_by_class: typed.split_by_class,
+        color_by_label: typed.color_by_label,
+        report: typed.report.clone(),
+        sparse_cloud: false,
     }
-    crate::cli::print(&with_maps_in_one_row(report).summary());
+}
+
+/// Completes the report of `program`, prints its summary, and writes it to `path`.
+fn conclude(
+    mut report: RunReport,
+    program: &str,
+    typed: &ArgMatches,
+    recorder: &Recorder,
+    path: Option<&Path>,
+) -> Result<()> {
+    report.program = program.to_owned();
+    report.version = env!("CARGO_PKG_VERSION").to_owned();
+    report.options = options_in_effect(typed);
+    report.warnings = recorder.warnings();
+    if let Some(path) = path {
+        write_report(&report, path)?;
+    }
+    crate::cli::print(&with_maps_in_one_row(&report).summary());
     Ok(())
+}
+
+/// Writes a report as JSON.
+///
+/// # Errors
+/// The file cannot be written.
+pub(crate) fn write_report(report: &RunReport, path: &Path) -> Result<()> {
+    let text = report.to_json().map_err(|e| Error::content(path, format!("no JSON: {e}")))?;
+    write_file(path, text.as_bytes())
 }
 
 /// The report with one row for all depth maps.

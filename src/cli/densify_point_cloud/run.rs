@@ -3,6 +3,7 @@
 use super::front::{self, Typing};
 use super::log::Log;
 use super::{help, refusals};
+use crate::cli::commands::write_report;
 use crate::cli::duration::Moment;
 use crate::cli::listen::Recorder;
 use crate::cli::options::FilterKind;
@@ -12,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
 use crate::progress::Progress;
 use crate::report::{RunReport, class_table};
-use crate::store::atomic::{create_folder, write_file};
+use crate::store::atomic::create_folder;
 use crate::store::cloud::PlyLayout;
 use semvs_formats::mvs::ArchiveKind;
 use std::ffi::OsString;
@@ -159,8 +160,7 @@ fn conclude(mut report: RunReport, job: &DensifyJob, typing: &Typing, log: &Log)
         report.program = "DensifyPointCloud".to_owned();
         report.version = env!("CARGO_PKG_VERSION").to_owned();
         report.options = typing.options.clone();
-        let text = report.to_json().map_err(|e| Error::content(path, format!("no JSON: {e}")))?;
-        write_file(path, text.as_bytes())?;
+        write_report(&report, path)?;
     }
     Ok(())
 }
