@@ -1,4 +1,5 @@
 //! Bad input ends in one clear line and exit code 1: no panic, nothing half-written, nothing lost.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod common;
 
@@ -87,9 +88,12 @@ fn too_few_views_and_no_points() {
     refused(&scratch, SMALL, &["no sparse points"]);
 }
 
+/// Makes an image unusable.
+type Spoil = fn(&Scratch);
+
 #[test]
 fn images_that_cannot_be_used_are_left_out_unless_strict() {
-    let make: [(&str, fn(&Scratch)); 4] = [
+    let make: [(&str, Spoil); 4] = [
         ("missing", |s| std::fs::remove_file(s.path("images/0005.jpg")).unwrap()),
         ("cut short", |s| s.edit("images/0005.jpg", |bytes| bytes.truncate(bytes.len() / 2))),
         ("no image", |s| drop(s.write("images/0005.jpg", "not a JPEG"))),

@@ -1,4 +1,5 @@
 //! What the programs accept, refuse and say: spellings, names of outputs, exit codes, help.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod common;
 

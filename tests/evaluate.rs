@@ -1,4 +1,5 @@
 //! Scores equal those of an independent script (numpy and scipy: one k-d tree, one dilation) on real clouds and maps.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 use semvs::evaluate::{
     CloudScoreOptions, LabelledPoints, MapScoreOptions, MapScores, cloud_scores, map_scores,

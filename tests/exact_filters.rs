@@ -1,4 +1,5 @@
 //! The depth filters reproduce OpenMVS 2.3.0 from its own raw maps.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod openmvs_maps;
 

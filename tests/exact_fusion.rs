@@ -1,4 +1,5 @@
 //! Fusion reproduces OpenMVS 2.3.0 from its own maps, point for point.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod openmvs_maps;
 

@@ -1,4 +1,5 @@
 //! The command lines of programs that call DensifyPointCloud.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod common;
 

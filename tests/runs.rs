@@ -1,4 +1,5 @@
 //! Whole runs on the bundled scene: the same bytes for any number of threads, labels, resuming, companions.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod common;
 

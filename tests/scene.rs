@@ -1,4 +1,5 @@
 //! Loading, view selection and regions of interest against OpenMVS's own outputs.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 use semvs::geometry::Camera;
 use semvs::scene::{NeighborOptions, ResolutionOptions, ViewNeighbors, select_neighbors};

@@ -1,4 +1,5 @@
 //! Rules about the source itself: who may import whom, how long files are, what may not be written.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod common;
 

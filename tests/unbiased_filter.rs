@@ -1,4 +1,5 @@
 //! The unbiased filter against exact depths, on OpenMVS's own raw maps of the bundled scene.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
 mod openmvs_maps;
 
