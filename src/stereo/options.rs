@@ -15,7 +15,7 @@ pub struct StereoOptions {
     pub candidates: u32,
     /// Source views, the best of each tile, that small changes of a plane are compared with. 1..=64. Default: 3.
     pub refine_views: u32,
-    /// A pixel whose final cost is not below this has no depth. (0, 2]. Default: 0.9.
+    /// A pixel whose final matching cost is not below this has no depth. (0, 2]. Default: 0.85.
     pub keep_cost: f32,
     /// Weight of the geometric term: cost added per pixel of disagreement, at most four. >= 0. Default: 0.1.
     pub geometric_weight: f32,
@@ -31,7 +31,7 @@ impl Default for StereoOptions {
             geometric_iterations: 2,
             candidates: 6,
             refine_views: 3,
-            keep_cost: 0.9,
+            keep_cost: 0.85,
             geometric_weight: 0.1,
             seed: 0,
         }
