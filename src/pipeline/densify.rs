@@ -8,7 +8,7 @@ use super::outputs::{check_depth_maps, check_places, class_rows, cloud_rows, wri
 use super::prepare::{Prepared, load, pixels_in_hand, prepare};
 use super::record::{Clock, view_rows, with_threads};
 use super::sparse::SparseCloud;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions, WithNormals};
 use crate::progress::{Event, Progress};
 use crate::report::{OutputReport, RunReport};
@@ -154,6 +154,13 @@ pub(super) fn write_results(
     progress: &Progress,
     report: &mut RunReport,
 ) -> Result<()> {
+    if fused.cloud.is_empty() {
+        return Err(Error::invalid(format!(
+            "no point is seen alike by {} views, and nothing is written: are the images and poses right? \
+             --number-views-fuse 2 asks for less",
+            options.number_views_fuse
+        )));
+    }
     let labels = prepared.labels.as_ref();
     let centers: Vec<Vector3<f64>> = prepared
         .loaded

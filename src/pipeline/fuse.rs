@@ -13,7 +13,7 @@ use crate::progress::{Event, Progress};
 use crate::report::RunReport;
 use crate::scene::{PointSource, ResolutionOptions, View, ViewIndex};
 use crate::store::cameras::working_cameras;
-use crate::store::depth_store::{DepthStore, Existing};
+use crate::store::depth_store::{DepthStore, Existing, depth_map_name};
 use crate::store::import::LoadedScene;
 use semvs_formats::Limits;
 use std::collections::BTreeSet;
@@ -39,7 +39,7 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
         Some(resolution) => working_cameras(&loaded, resolution, job.input.strict)?,
         None => map_cameras(&loaded, &headers, job.input.strict)?,
     };
-    let mapped = maps_of_the_scene(&loaded, &cameras, &headers)?;
+    let mapped = maps_of_the_scene(&loaded, &cameras, &headers, job.input.strict, progress)?;
     clock.stage("load");
     let decode = job.fusion.estimate_colors != AttributeSource::None;
     let prepared = prepare(&job.input, loaded, cameras, decode, progress)?;
@@ -91,17 +91,21 @@ fn map_cameras(loaded: &LoadedScene, store: &DepthStore, strict: bool) -> Result
         .collect())
 }
 
-/// The views whose depth maps are in the folder; every one found must belong to the scene.
+/// The views whose depth maps are in the folder; every one found must belong to the scene. Views without a map are
+/// named, or an error in a strict run.
 fn maps_of_the_scene(
     loaded: &LoadedScene,
     cameras: &[Option<Camera>],
     store: &DepthStore,
+    strict: bool,
+    progress: &Progress,
 ) -> Result<Vec<ViewIndex>> {
     let mut found = Vec::new();
+    let mut missing = Vec::new();
     for (i, (view, camera)) in loaded.scene.views.iter().zip(cameras).enumerate() {
         let Some(camera) = camera else { continue };
         match store.existing(view.id, camera) {
-            Existing::Absent => {}
+            Existing::Absent => missing.push(depth_map_name(view.id)),
             Existing::Usable => found.push(ViewIndex(i as u32)),
             Existing::Unusable(why) => {
                 return Err(Error::invalid(format!(
@@ -110,7 +114,18 @@ fn maps_of_the_scene(
             }
         }
     }
-    if found.is_empty() { Err(no_maps(store)) } else { Ok(found) }
+    if found.is_empty() {
+        return Err(no_maps(store));
+    }
+    if !missing.is_empty() {
+        let what =
+            format!("{} of the scene's depth maps are not here: {}", missing.len(), missing.join(", "));
+        if strict {
+            return Err(Error::content(store.folder(), what));
+        }
+        progress.warn(format!("{}: {what}; their views are left out", store.folder().display()));
+    }
+    Ok(found)
 }
 
 fn no_maps(store: &DepthStore) -> Error {

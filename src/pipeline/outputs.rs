@@ -3,7 +3,7 @@
 use super::job::{Outputs, SceneArchive};
 use super::prepare::Prepared;
 use super::skip::Labels;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fusion::FusionSummary;
 use crate::progress::{Event, Progress};
 use crate::report::{ClassRow, OutputReport, fill_shares};
@@ -13,6 +13,9 @@ use crate::store::atomic::check_writable;
 use crate::store::cloud::{CloudOptions, WrittenClouds, check_cloud_paths, write_clouds};
 use crate::store::depth_store::DepthStore;
 use crate::store::export::{interface_archive, project_archive, write_interface, write_project};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 use std::time::Instant;
 
 /// Checks that everything can be written, creating missing folders.
@@ -22,7 +25,28 @@ use std::time::Instant;
 pub(super) fn check_places(outputs: &Outputs, labels: Option<&Labels>) -> Result<()> {
     let options = cloud_options(outputs, labels);
     check_cloud_paths(&outputs.cloud, &options, labels.map(Labels::policy))?;
-    [&outputs.scene, &outputs.report].into_iter().flatten().try_for_each(|path| check_writable(path))
+    [&outputs.scene, &outputs.report].into_iter().flatten().try_for_each(|path| check_writable(path))?;
+    outputs.report.as_deref().map_or(Ok(()), |report| check_report(report, outputs))
+}
+
+/// Refuses a report in the place of another output, or of a file that is no report: a mistyped name must not cost a
+/// photograph.
+fn check_report(report: &Path, outputs: &Outputs) -> Result<()> {
+    if report == outputs.cloud || Some(report) == outputs.scene.as_deref() {
+        return Err(Error::content(
+            report,
+            "--report: this run writes another file there; choose another name",
+        ));
+    }
+    let mut first = [0u8; 1];
+    let begun = File::open(report).and_then(|mut file| file.read(&mut first));
+    if matches!(begun, Ok(1)) && first != *b"{" {
+        return Err(Error::content(
+            report,
+            "--report: the file there is no report; choose another name or remove it",
+        ));
+    }
+    Ok(())
 }
 
 /// Checks that depth maps can be written, creating the folder.

@@ -91,11 +91,17 @@ pub(super) fn view_rows(
         .collect()
 }
 
+/// More threads than this only cost time: no stage has more work at once on a machine of today.
+const MOST_THREADS: usize = 1024;
+
 /// Runs `work` on a pool of `threads` threads; 0 = as many as the machine has.
 ///
 /// # Errors
 /// Those of `work`; the threads cannot be started.
 pub(super) fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    if threads > MOST_THREADS {
+        return Err(Error::invalid(format!("--max-threads {threads}: at most {MOST_THREADS} are of use")));
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()

@@ -68,9 +68,15 @@ fn working_camera(
     Ok(calibration.camera_at(resolution.working_size(size)))
 }
 
+/// A photograph smaller than the scene says by more than this is another one, a thumbnail perhaps.
+const MOST_REDUCED: f64 = 1.0 / 8.0;
+
 /// Whether `file` is `stated` at another scale, given that either may have been rounded to whole pixels.
 fn same_shape(stated: Size, file: Size) -> bool {
     let factor = f64::from(file.longest()) / f64::from(stated.longest());
+    if factor < MOST_REDUCED {
+        return false;
+    }
     let tolerance = 0.5 * factor.max(1.0) + 1.0;
     let agrees = |s: u32, f: u32| (f64::from(s) * factor - f64::from(f)).abs() <= tolerance;
     agrees(stated.width, file.width) && agrees(stated.height, file.height)
@@ -86,6 +92,8 @@ mod tests {
         assert!(same_shape(size(640, 479), size(640, 479)));
         assert!(same_shape(size(80, 60), size(640, 479)));
         assert!(same_shape(size(640, 479), size(80, 60)));
+        assert!(!same_shape(size(400, 300), size(40, 30)), "a thumbnail");
+        assert!(!same_shape(size(400, 300), size(1, 1)));
         assert!(!same_shape(size(640, 479), size(479, 640)));
         assert!(!same_shape(size(640, 480), size(640, 470)));
         assert!(!same_shape(size(640, 480), size(600, 480)));
