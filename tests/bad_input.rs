@@ -245,3 +245,50 @@ fn clouds_cut_short_or_corrupt() {
     missing.fails_naming(&["none.ply"]);
     scratch.semvs("evaluate truth.ply --truth truth.ply --thresholds -1").fails_naming(&["-1"]);
 }
+
+#[test]
+fn a_report_never_replaces_an_input_or_another_output() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps");
+    let photograph = scratch.read("images/0003.jpg");
+    let map = scratch.read("maps/depth0000.dmap");
+    let fuse = |report: &str| {
+        scratch.semvs(&format!("fuse scene.mvs --depth-maps maps -o fused.ply --report {report}"))
+    };
+    for report in ["images/0003.jpg", "maps/depth0000.dmap", "scene.mvs", "fused.ply"] {
+        fuse(report).fails_naming(&["--report", report]);
+    }
+    assert_eq!(scratch.read("images/0003.jpg"), photograph);
+    assert_eq!(scratch.read("maps/depth0000.dmap"), map);
+    fuse("run.json").ok();
+    fuse("run.json").ok();
+}
+
+#[test]
+fn missing_depth_maps_are_named_and_refused_when_strict() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps");
+    std::fs::remove_file(scratch.path("maps/depth0002.dmap")).unwrap();
+    let fuse = "fuse scene.mvs --depth-maps maps -o fused.ply";
+    let out = scratch.semvs(fuse).ok();
+    assert!(out.stderr.contains("depth0002.dmap"), "{}", out.stderr);
+    scratch.semvs(&format!("{fuse} --strict")).fails_naming(&["depth0002.dmap"]);
+}
+
+#[test]
+fn a_cloud_without_points_is_a_failure() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps");
+    for map in 1..6 {
+        std::fs::remove_file(scratch.path(&format!("maps/depth000{map}.dmap"))).unwrap();
+    }
+    scratch.write("fused.ply", "from before");
+    scratch.semvs("fuse scene.mvs --depth-maps maps -o fused.ply").fails_naming(&["no point"]);
+    assert_eq!(scratch.read("fused.ply"), b"from before");
+}
+
+#[test]
+fn absurd_thread_counts_are_refused() {
+    let scratch = Scratch::facade6();
+    refused(&scratch, &format!("{SMALL} --max-threads 100000"), &["--max-threads 100000"]);
+}
