@@ -216,3 +216,13 @@ fn sparse_points_and_neighbours_come_from_files_when_given() {
         .semvs(&format!("densify scene.mvs {FUSE_ONLY} -o nb.ply --view-neighbors-file nb.txt"))
         .fails_naming(&["nb.txt", "77"]);
 }
+
+#[test]
+fn the_written_scene_finds_its_images_from_anywhere() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps/deep");
+    let keep = "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
+    scratch.semvs(&format!("densify scene.mvs -o out/cloud.ply -w maps/deep {keep}")).ok();
+    scratch.semvs("fuse out/cloud.mvs --depth-maps maps/deep -o again.ply").ok();
+    assert_eq!(scratch.read("out/cloud.ply"), scratch.read("again.ply"));
+}

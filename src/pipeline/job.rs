@@ -165,6 +165,9 @@ pub struct Outputs {
     pub color_by_label: bool,
     /// JSON summary.
     pub report: Option<PathBuf>,
+    /// Name the images in the scene from the scene's folder, so that it can be used from anywhere; else from the
+    /// working folder, as OpenMVS does.
+    pub names_from_scene: bool,
     /// Write the sparse points as the cloud when only depth maps are wanted, as OpenMVS does.
     pub sparse_cloud: bool,
 }

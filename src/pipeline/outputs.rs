@@ -12,7 +12,9 @@ use crate::semantics::ClassId;
 use crate::store::atomic::check_writable;
 use crate::store::cloud::{CloudOptions, WrittenClouds, check_cloud_paths, write_clouds};
 use crate::store::depth_store::DepthStore;
-use crate::store::export::{interface_archive, project_archive, write_interface, write_project};
+use crate::store::export::{
+    interface_archive, project_archive, relocate_names, write_interface, write_project,
+};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -101,11 +103,17 @@ pub(super) fn write_scene(
     let Some(path) = &outputs.scene else { return Ok(()) };
     let start = Instant::now();
     let Prepared { loaded, cameras, neighbors, .. } = prepared;
+    let mut archive = match outputs.archive {
+        SceneArchive::Interface => interface_archive(loaded, cameras, neighbors),
+        SceneArchive::Project(_) => project_archive(loaded, cameras, neighbors, cloud)?,
+    };
+    if outputs.names_from_scene {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        relocate_names(&mut archive, &loaded.search.working_folder, folder);
+    }
     match outputs.archive {
-        SceneArchive::Interface => write_interface(path, &interface_archive(loaded, cameras, neighbors))?,
-        SceneArchive::Project(kind) => {
-            write_project(path, &project_archive(loaded, cameras, neighbors, cloud)?, kind)?;
-        }
+        SceneArchive::Interface => write_interface(path, &archive)?,
+        SceneArchive::Project(kind) => write_project(path, &archive, kind)?,
     }
     progress.event(Event::SceneSaved { path: path.clone(), elapsed: start.elapsed() });
     Ok(())

@@ -77,6 +77,20 @@ pub fn project_archive(
     Ok(archive)
 }
 
+/// Makes the names of images and masks in `archive`, which are relative to `from`, relative to `to`.
+pub fn relocate_names(archive: &mut mvs::Scene, from: &Path, to: &Path) {
+    let relocated = |stored: &[u8]| match std::str::from_utf8(stored) {
+        Ok(name) if !name.is_empty() && !Path::new(name).is_absolute() => {
+            name_relative_to(&from.join(name), to).into_bytes()
+        }
+        _ => stored.to_vec(),
+    };
+    for image in &mut archive.images {
+        image.name = relocated(&image.name);
+        image.mask_name = relocated(&image.mask_name);
+    }
+}
+
 /// Writes a project archive, whole or not at all.
 ///
 /// # Errors

@@ -23,6 +23,7 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
             split_by_class: args.split_by_class,
             color_by_label: args.color_by_label,
             report: None,
+            names_from_scene: true,
             sparse_cloud: false,
         },
     };

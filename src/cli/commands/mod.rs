@@ -76,6 +76,7 @@ fn outputs(typed: &LabelOutput, cloud: PathBuf, scene: Option<PathBuf>) -> Outpu
         split_by_class: typed.split_by_class,
         color_by_label: typed.color_by_label,
         report: typed.report.clone(),
+        names_from_scene: true,
         sparse_cloud: false,
     }
 }

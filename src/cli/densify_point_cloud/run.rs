@@ -147,6 +147,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
             split_by_class: outputs.split_by_class,
             color_by_label: outputs.color_by_label,
             report: outputs.report.as_deref().map(|path| under(folder, &openmvs_path(path))),
+            names_from_scene: false,
             sparse_cloud: true,
         },
     })
