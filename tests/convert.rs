@@ -44,6 +44,7 @@ fn job(depth_maps: Vec<PathBuf>, labels: Option<LabelJob>, cloud: &Path) -> Conv
         split_by_class: false,
         color_by_label: false,
         report: None,
+        names_from_scene: true,
         sparse_cloud: false,
     };
     ConvertJob { depth_maps, working_folder: Some(facade()), labels, outputs }
