@@ -2,7 +2,7 @@
 
 use super::label_options::{LabelInput, PlyLayout};
 use super::options::SharedOptions;
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// Oriented photographs to dense, semantically labelled point clouds.
@@ -54,10 +54,12 @@ pub(crate) enum Command {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = DENSIFY_EXAMPLES)]
 pub(crate) struct DensifyArgs {
-    /// Scene with cameras, image names and sparse points (OpenMVS's .mvs)
+    /// Scene with cameras, image names and sparse points: OpenMVS's .mvs, or the folder of COLMAP's
+    /// image_undistorter
     #[arg(value_name = "SCENE.mvs")]
     pub(crate) scene: PathBuf,
-    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene]
+    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene; semvs/dense.ply in a COLMAP folder, with the
+    /// depth maps]
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
@@ -70,29 +72,44 @@ Examples:
       everything into the folder out/
   semvs densify scene.mvs -o draft.ply --resolution-level 2 --number-views 3 --geometric-iters 1
       a quick look
+  semvs densify colmap/dense
+      COLMAP's undistorted workspace; everything goes into colmap/dense/semvs
   semvs densify scene.mvs -o cloud.ply --label-path labels --class-table classes.toml
       with classes of your own: classes.toml has entries [[class]] with id, name and color";
 
 /// Fuse depth maps that exist into a cloud, without estimating anything
 ///
-/// Takes the depth maps of semvs and of OpenMVS (depthNNNN.dmap). The depth maps are only read.
+/// Takes the depth maps of semvs and of OpenMVS (depthNNNN.dmap), and those that COLMAP left in its workspace, which have
+/// no confidence: all their depths count alike, but for their distance. The depth maps are only read.
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = FUSE_EXAMPLES,
     mut_args(|arg| if NOT_FOR_FUSE.contains(&arg.get_id().as_str()) { arg.hide(true) } else { arg })
 )]
 pub(crate) struct FuseArgs {
-    /// Scene that the depth maps belong to (OpenMVS's .mvs)
+    /// Scene that the depth maps belong to: OpenMVS's .mvs, or the folder of COLMAP's dense stage
     #[arg(value_name = "SCENE.mvs")]
     pub(crate) scene: PathBuf,
-    /// Folder of the depth maps [default: the working folder]
+    /// Folder of the depth maps [default: the working folder; of a COLMAP folder its own maps]
     #[arg(long, value_name = "DIR")]
     pub(crate) depth_maps: Option<PathBuf>,
-    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene]
+    /// Which maps of a COLMAP folder [default: geometric, if there are any]
+    #[arg(long, value_name = "PASS", value_enum, conflicts_with = "depth_maps")]
+    pub(crate) maps: Option<ColmapPass>,
+    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene; semvs/dense.ply in a COLMAP folder]
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) shared: SharedOptions,
+}
+
+/// `--maps`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ColmapPass {
+    /// of the final pass, which compares depth maps with each other
+    Geometric,
+    /// of the first pass
+    Photometric,
 }
 
 /// Shared options that have no effect when nothing is estimated; taken all the same, so that a command line can be
@@ -111,6 +128,8 @@ const NOT_FOR_FUSE: &[&str] = &[
 const FUSE_EXAMPLES: &str = "\
 Examples:
   semvs fuse scene.mvs --depth-maps depthmaps -o cloud.ply
+  semvs fuse colmap/dense --maps geometric -o cloud.ply --label-path labels --class-table cityscapes
+      COLMAP's depth maps, made on a GPU, to a labelled cloud
   semvs fuse scene.mvs --depth-maps depthmaps -o facade.ply --label-path labels \\
       --class-table 3dom-facade --classes building,window,door --label-consistency strict";
 

@@ -1,8 +1,8 @@
 //! Depth maps that exist to a cloud.
 
-use super::densify::{plain_store, write_results};
+use super::densify::write_results;
 use super::fusing::fuse_maps;
-use super::job::FuseJob;
+use super::job::{DepthMapsJob, FuseJob};
 use super::outputs::check_places;
 use super::prepare::{load, prepare};
 use super::record::{Clock, view_rows, with_threads};
@@ -13,7 +13,8 @@ use crate::progress::{Event, Progress};
 use crate::report::RunReport;
 use crate::scene::{PointSource, ResolutionOptions, View, ViewIndex};
 use crate::store::cameras::working_cameras;
-use crate::store::depth_store::{DepthStore, Existing, depth_map_name};
+use crate::store::colmap::{ColmapMaps, Pass};
+use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::LoadedScene;
 use semvs_formats::Limits;
 use std::collections::BTreeSet;
@@ -29,24 +30,25 @@ pub fn fuse(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
 fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let mut clock = Clock::start();
     job.check()?;
-    if !job.depth_maps.is_dir() {
-        return Err(Error::content(&job.depth_maps, "no such folder of depth maps (--depth-maps)"));
+    if let DepthMapsJob::Folder(folder) = &job.depth_maps
+        && !folder.is_dir()
+    {
+        return Err(Error::content(folder, "no such folder of depth maps (--depth-maps)"));
     }
     check_places(&job.outputs.without_labels(), None)?;
     let loaded = load(&job.input, progress)?;
-    let headers = DepthStore::new(&job.depth_maps, loaded.search.clone(), 0, Limits::default());
+    let store = open_maps(&job.depth_maps, &loaded)?;
     let cameras = match &job.resolution {
         Some(resolution) => working_cameras(&loaded, resolution, job.input.strict)?,
-        None => map_cameras(&loaded, &headers, job.input.strict)?,
+        None => map_cameras(&loaded, &store, job.input.strict)?,
     };
-    let mapped = maps_of_the_scene(&loaded, &cameras, &headers, job.input.strict, progress)?;
+    let mapped = maps_of_the_scene(&loaded, &cameras, &store, job.input.strict, progress)?;
     clock.stage("load");
     let decode = job.fusion.estimate_colors != AttributeSource::None;
     let prepared = prepare(&job.input, loaded, cameras, decode, progress)?;
     let mapped: Vec<ViewIndex> =
         mapped.into_iter().filter(|v| prepared.cameras[v.index()].is_some()).collect();
     check_places(&job.outputs, prepared.labels.as_ref())?;
-    let store = plain_store(&prepared, &job.depth_maps);
     clock.stage("prepare");
 
     let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
@@ -60,6 +62,33 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     clock.stage("write");
     clock.finish(&mut report);
     Ok(report)
+}
+
+/// The depth maps of a job; fusion keeps what it needs itself.
+fn open_maps(maps: &DepthMapsJob, loaded: &LoadedScene) -> Result<DepthStore> {
+    match (maps, &loaded.workspace) {
+        (DepthMapsJob::Folder(folder), _) => {
+            Ok(DepthStore::new(folder, loaded.search.clone(), 0, Limits::default()))
+        }
+        (DepthMapsJob::Colmap(pass), Some(workspace)) => {
+            let passes = pass.map_or_else(|| Pass::ALL.to_vec(), |pass| vec![pass]);
+            let mut found = passes.iter().map(|&pass| ColmapMaps::new(workspace, pass, &loaded.scene));
+            match found.find(ColmapMaps::any) {
+                Some(maps) => Ok(DepthStore::colmap(maps, loaded.search.clone())),
+                None => {
+                    let names = passes.iter().map(|pass| pass.name()).collect::<Vec<_>>().join(" or ");
+                    let what = format!(
+                        "no {names} depth map in stereo/depth_maps: run `colmap patch_match_stereo`, or `semvs densify` on \
+                         this folder, or say where the maps are (--depth-maps)"
+                    );
+                    Err(Error::content(&workspace.root, what))
+                }
+            }
+        }
+        (DepthMapsJob::Colmap(_), None) => {
+            Err(Error::content(&loaded.path, "--maps needs a COLMAP workspace in place of the scene"))
+        }
+    }
 }
 
 /// The cameras at the sizes of the depth maps; views without a map get the reduction of the first map.
@@ -77,18 +106,19 @@ fn map_cameras(loaded: &LoadedScene, store: &DepthStore, strict: bool) -> Result
         sizes.push(size);
     }
     let Some((small, large)) = reduction else { return Err(no_maps(store)) };
-    let camera_of = |view: &View, full: Size, of_map: Option<Size>| {
+    let camera_of = |view: &View, full: &Camera, of_map: Option<Size>| {
+        if let Some(size) = of_map.filter(|_| store.is_colmap()) {
+            return Some(full.scaled_per_axis(size));
+        }
         let longest = match of_map {
             Some(size) => size.longest(),
-            None => (u64::from(full.longest()) * u64::from(small) / u64::from(large)) as u32,
+            None => (u64::from(full.size().longest()) * u64::from(small) / u64::from(large)) as u32,
         };
         let at = ResolutionOptions { level: 0, max: longest.max(1), ..ResolutionOptions::default() };
-        view.calibration.as_ref().map(|c| c.camera_at(at.working_size(full)))
+        view.calibration.as_ref().map(|c| c.camera_at(at.working_size(full.size())))
     };
     let views = loaded.scene.views.iter().zip(&full_size).zip(sizes);
-    Ok(views
-        .map(|((view, full), size)| full.as_ref().and_then(|full| camera_of(view, full.size(), size)))
-        .collect())
+    Ok(views.map(|((view, full), size)| full.as_ref().and_then(|full| camera_of(view, full, size))).collect())
 }
 
 /// The views whose depth maps are in the folder; every one found must belong to the scene. Views without a map are
@@ -105,7 +135,7 @@ fn maps_of_the_scene(
     for (i, (view, camera)) in loaded.scene.views.iter().zip(cameras).enumerate() {
         let Some(camera) = camera else { continue };
         match store.existing(view.id, camera) {
-            Existing::Absent => missing.push(depth_map_name(view.id)),
+            Existing::Absent => missing.push(store.name(view.id)),
             Existing::Usable => found.push(ViewIndex(i as u32)),
             Existing::Unusable(why) => {
                 return Err(Error::invalid(format!(
@@ -129,8 +159,12 @@ fn maps_of_the_scene(
 }
 
 fn no_maps(store: &DepthStore) -> Error {
+    let names = match store.is_colmap() {
+        true => "IMAGE.geometric.bin or IMAGE.photometric.bin",
+        false => "depthNNNN.dmap by the images' IDs",
+    };
     Error::content(
         store.folder(),
-        "no depth map of the scene's images is here; they are named depthNNNN.dmap by the images' IDs",
+        format!("no depth map of the scene's images is here; they are named {names}"),
     )
 }

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Size};
 use crate::progress::{Progress, Stage};
-use crate::scene::{ColorImage, GrayImage, ResolutionOptions, ViewIndex, gray_from_color};
+use crate::scene::{ColorImage, GrayImage, ResolutionOptions, ViewIndex, gray_from_color, resize_nearest};
 use crate::store::byte_cache::ByteCache;
 use crate::store::images::load_working_color;
 use crate::store::import::LoadedScene;
@@ -49,7 +49,10 @@ impl Images {
     /// The file cannot be decoded or has another shape.
     pub(super) fn color(&self, view: ViewIndex, size: Size) -> Result<Arc<ColorImage>> {
         let image = self.colors.get_or_load(view, || {
-            let image = load_working_color(self.path(view), &at_longest(size))?;
+            let mut image = load_working_color(self.path(view), &at_longest(size))?;
+            if differs_by_rounding(image.size(), size) {
+                image = resize_nearest(&image, size);
+            }
             let bytes = size_of_val(image.data());
             Ok((image, bytes))
         })?;
@@ -98,6 +101,11 @@ impl Images {
             .collect();
         results.into_iter().flatten().collect()
     }
+}
+
+/// Whether two sizes are one, rounded by different rules, as those of COLMAP's maps.
+fn differs_by_rounding(a: Size, b: Size) -> bool {
+    a != b && a.width.abs_diff(b.width) <= 1 && a.height.abs_diff(b.height) <= 1
 }
 
 /// The resolution at which an image gets `size`.

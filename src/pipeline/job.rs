@@ -8,6 +8,7 @@ use crate::scene::{NeighborOptions, ResolutionOptions, RoiEstimation};
 use crate::semantics::ClassRules;
 use crate::stereo::StereoOptions;
 use crate::store::cloud::PlyLayout;
+use crate::store::colmap::Pass;
 use crate::store::labels::LabelSources;
 use semvs_formats::mvs::ArchiveKind;
 use std::path::{Path, PathBuf};
@@ -140,12 +141,22 @@ pub struct FuseJob {
     pub input: SceneJob,
     /// Size that the depth maps must have; `None`: any size that fits the image.
     pub resolution: Option<ResolutionOptions>,
-    /// Folder of the depth maps.
-    pub depth_maps: PathBuf,
+    /// The depth maps.
+    pub depth_maps: DepthMapsJob,
     /// Fusion.
     pub fusion: FusionOptions,
     /// What to write.
     pub outputs: Outputs,
+}
+
+/// Depth maps that exist.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DepthMapsJob {
+    /// The `depthNNNN.dmap` in a folder.
+    Folder(PathBuf),
+    /// Those that a pass of COLMAP left in the workspace that the scene is; `None`: the geometric pass if there are
+    /// any of it, else the photometric one.
+    Colmap(Option<Pass>),
 }
 
 /// Files to write.

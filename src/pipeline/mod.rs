@@ -24,5 +24,6 @@ pub use densify::{DEPTH_MAP, densify};
 pub use evaluate::{EvaluateJob, evaluate};
 pub use fuse::fuse;
 pub use job::{
-    AcrossViews, DensifyJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob, SceneArchive, SceneJob,
+    AcrossViews, DensifyJob, DepthMapsJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob,
+    SceneArchive, SceneJob,
 };

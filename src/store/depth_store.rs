@@ -2,6 +2,7 @@
 
 use super::atomic::AtomicFile;
 use super::byte_cache::ByteCache;
+use super::colmap::{ColmapMapHeader, ColmapMaps};
 use super::depth_map::{estimate_from_file, file_from_estimate};
 use super::paths::{SearchPath, name_relative_to};
 use crate::error::{Error, Result};
@@ -36,13 +37,24 @@ pub struct DepthStore {
     images: SearchPath,
     limits: Limits,
     cache: ByteCache<ImageId, DepthEstimate>,
+    /// The maps of a COLMAP workspace instead of those in `folder`; they are only read.
+    colmap: Option<ColmapMaps>,
 }
 
 impl DepthStore {
     /// The depth maps in `folder`, of which up to `cache_bytes` are kept in memory. `images` says what the image
     /// names of estimates mean, so that files can name them relative to `folder`.
     pub fn new(folder: &Path, images: SearchPath, cache_bytes: usize, limits: Limits) -> Self {
-        DepthStore { folder: folder.to_owned(), images, limits, cache: ByteCache::new(cache_bytes) }
+        let cache = ByteCache::new(cache_bytes);
+        DepthStore { folder: folder.to_owned(), images, limits, cache, colmap: None }
+    }
+
+    /// The maps of a COLMAP workspace. Nothing can be written; nothing is kept in memory.
+    pub fn colmap(maps: ColmapMaps, images: SearchPath) -> Self {
+        DepthStore {
+            colmap: Some(maps.clone()),
+            ..DepthStore::new(&maps.folder(), images, 0, Limits::default())
+        }
     }
 
     /// The folder.
@@ -52,7 +64,19 @@ impl DepthStore {
 
     /// The file of a view, be it there or not.
     pub fn path(&self, id: ImageId) -> PathBuf {
-        self.folder.join(depth_map_name(id))
+        let in_workspace = self.colmap.as_ref().and_then(|maps| maps.path(id));
+        in_workspace.unwrap_or_else(|| self.folder.join(depth_map_name(id)))
+    }
+
+    /// The file of a view relative to the folder.
+    pub fn name(&self, id: ImageId) -> String {
+        let path = self.path(id);
+        path.strip_prefix(&self.folder).unwrap_or(&path).display().to_string()
+    }
+
+    /// Whether these are the maps of a COLMAP workspace.
+    pub fn is_colmap(&self) -> bool {
+        self.colmap.is_some()
     }
 
     /// The file that [`DepthStore::write_pending`] writes.
@@ -79,6 +103,9 @@ impl DepthStore {
     /// The file cannot be read or is damaged.
     pub fn header(&self, id: ImageId) -> Result<Option<DepthMapHeader>> {
         let path = self.path(id);
+        if let Some(maps) = &self.colmap {
+            return Ok(maps.header(id)?.map(|header| colmap_header(id, header)));
+        }
         match read_header(&path, &self.limits) {
             Ok(header) => Ok(Some(header)),
             Err(semvs_formats::Error::Io(e)) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -93,7 +120,10 @@ impl DepthStore {
     pub fn read(&self, id: ImageId) -> Result<Arc<DepthEstimate>> {
         self.cache.get_or_load(id, || {
             let path = self.path(id);
-            let estimate = read_depth_map(&path, self.limits)?;
+            let estimate = match &self.colmap {
+                Some(maps) => maps.read(id)?,
+                None => read_depth_map(&path, self.limits)?,
+            };
             if estimate.image_id != id {
                 let what = format!(
                     "this is the depth map of image {}, not {id}; estimate it again",
@@ -147,6 +177,7 @@ impl DepthStore {
     /// # Errors
     /// It cannot be deleted.
     pub fn delete(&self, id: ImageId) -> Result<()> {
+        self.check_ours()?;
         let path = self.path(id);
         self.cache.remove(id);
         match std::fs::remove_file(&path) {
@@ -155,9 +186,38 @@ impl DepthStore {
         }
     }
 
+    /// Refuses to touch the maps of a COLMAP workspace.
+    fn check_ours(&self) -> Result<()> {
+        match self.colmap {
+            Some(_) => Err(Error::content(&self.folder, "the depth maps of COLMAP are only read")),
+            None => Ok(()),
+        }
+    }
+
     fn write_to(&self, path: &Path, estimate: &DepthEstimate) -> Result<()> {
+        self.check_ours()?;
         let name = name_relative_to(&self.images.find(&estimate.image_name), &self.folder);
         write_depth_map(path, estimate, &name)
+    }
+}
+
+/// The header of a map of COLMAP as that of a depth map of ours.
+fn colmap_header(id: ImageId, header: ColmapMapHeader) -> DepthMapHeader {
+    let camera = &header.camera;
+    let row_major = |m: &Matrix3<f64>| std::array::from_fn(|i| m[(i / 3, i % 3)]);
+    let (width, height) = (camera.size().width, camera.size().height);
+    DepthMapHeader {
+        image_width: width,
+        image_height: height,
+        width,
+        height,
+        image_name: header.image_name.into_bytes(),
+        ids: vec![id.0],
+        k: row_major(camera.k()),
+        rotation: row_major(camera.rotation()),
+        center: (*camera.center()).into(),
+        has_normal: header.has_normal,
+        ..DepthMapHeader::default()
     }
 }
 

@@ -1,5 +1,6 @@
-//! From a `.mvs` file to the scene that every stage sees.
+//! From a `.mvs` file or a COLMAP workspace to the scene that every stage sees.
 
+use super::colmap::Workspace;
 use super::images::image_size;
 use super::paths::{SearchPath, clean_name};
 use crate::error::{Error, Result};
@@ -20,10 +21,12 @@ pub struct LoadedScene {
     pub archive: mvs::Scene,
     /// Which archive the file is.
     pub container: mvs::Container,
-    /// The scene file.
+    /// The scene file or the folder of the workspace.
     pub path: PathBuf,
     /// Where the scene's names are looked for.
     pub search: SearchPath,
+    /// The workspace, if the scene is one.
+    pub workspace: Option<Workspace>,
 }
 
 impl LoadedScene {
@@ -34,7 +37,7 @@ impl LoadedScene {
 }
 
 /// Loads the scene file at `path`. Names in it are relative to `working_folder` (empty = the current folder) or,
-/// failing that, to the folder of the file.
+/// failing that, to the folder of the file. A folder is taken for a COLMAP workspace; its images are its own.
 ///
 /// What can be left out without harm is, with a warning: sparse points at no finite place, views of points that name
 /// no calibrated image, neighbour scores that lead nowhere. Where images share a global ID, all get
@@ -44,14 +47,23 @@ impl LoadedScene {
 /// [`Error`] if the file cannot be read, a calibrated image has impossible camera data, or fewer than two images
 /// are calibrated.
 pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result<LoadedScene> {
-    let file = SceneFile::read(path, limits).map_err(|e| Error::format(path, e))?;
-    let (mut archive, container) = (file.scene, file.container);
+    let workspace = path.is_dir().then(|| Workspace::at(path, None)).transpose()?;
+    let (mut archive, container, search) = match &workspace {
+        Some(workspace) => {
+            let container = mvs::Container::Interface { version: mvs::NEWEST_VERSION };
+            let search = SearchPath { working_folder: path.to_owned(), scene_folder: path.to_owned() };
+            (workspace.read_scene(limits)?, container, search)
+        }
+        None => {
+            let file = SceneFile::read(path, limits).map_err(|e| Error::format(path, e))?;
+            (file.scene, file.container, SearchPath::new(working_folder, path))
+        }
+    };
     // Before repair merges them: a view that observed a point twice counts twice in view selection.
     let tracks = import_tracks(&archive);
     let repairs = archive.repair().map_err(|e| Error::format(path, e))?;
     warn_of_repairs(path, &repairs);
     archive.check().map_err(|e| Error::format(path, e))?;
-    let search = SearchPath::new(working_folder, path);
     let views = import_views(path, &archive, container, &search)?;
     let calibrated = views.iter().filter(|v| v.calibration.is_some()).count();
     if calibrated < 2 {
@@ -63,7 +75,7 @@ pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result
     }
     let roi = archive.obb.as_ref().map(import_roi);
     let scene = Scene { views, tracks, roi };
-    Ok(LoadedScene { scene, archive, container, path: path.to_owned(), search })
+    Ok(LoadedScene { scene, archive, container, path: path.to_owned(), search, workspace })
 }
 
 /// The views in file order.

@@ -5,6 +5,7 @@ pub(crate) mod byte_cache;
 pub mod cameras;
 pub mod cloud;
 mod cloud_names;
+pub mod colmap;
 mod depth_map;
 pub mod depth_store;
 pub mod export;

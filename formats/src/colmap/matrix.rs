@@ -90,6 +90,26 @@ impl Matrix {
     }
 }
 
+/// Width, height and channels of the map in `source`, whose header alone is read. `length` is the number of bytes in
+/// `source`, if known.
+///
+/// # Errors
+/// [`Error::Format`] for a broken header or a length that is not what the header says; [`Error::Io`].
+pub fn read_matrix_size(source: impl Read, length: Option<u64>) -> Result<[u32; 3]> {
+    let mut r = Reader::new(source, length.map(|n| n.min(MAX_HEADER as u64)), &Limits::default());
+    let sizes = read_header(&mut r)?;
+    let values = sizes.iter().try_fold(4u64, |n, &size| n.checked_mul(size.into()));
+    let header = sizes.iter().map(|size| size.to_string().len() as u64 + 1).sum::<u64>();
+    let expected = values.and_then(|n| n.checked_add(header));
+    if length.is_some_and(|found| expected != Some(found)) {
+        let [width, height, channels] = sizes;
+        let what =
+            format!("{} bytes, not those of {width} x {height} x {channels} values", length.unwrap_or(0));
+        return Err(r.error(&Place::Root("matrix"), what));
+    }
+    Ok(sizes)
+}
+
 /// `width&height&channels&`, each at least 1.
 pub(super) fn read_header<R: Read>(r: &mut Reader<R>) -> Result<[u32; 3]> {
     let root = Place::Root("header");

@@ -20,7 +20,7 @@ pub use config::{
     patch_match_config,
 };
 pub use consistency::ConsistencyGraph;
-pub use matrix::Matrix;
+pub use matrix::{Matrix, read_matrix_size};
 pub use model::{
     Camera, CameraModel, Frame, FrameData, Image, Model, NO_POINT, Observation, Points, Pose, Rig, RigSensor,
     Sensor, SensorKind, TrackElement,

@@ -1,6 +1,6 @@
 //! `semvs densify`.
 
-use super::{cloud_path, conclude, default_cloud, is_typed, outputs, resolver};
+use super::{cloud_path, conclude, default_cloud, is_typed, outputs, own_folder, resolver, spare_workspace};
 use crate::cli::listen::Recorder;
 use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
@@ -30,7 +30,13 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
             "--output: the scene written beside the cloud would replace the input; choose another name";
         return Err(Error::content(&cloud, what));
     }
-    let folder = shared.run.working_folder.clone().unwrap_or_default();
+    let outputs = outputs(&shared.labels.output, cloud, Some(scene));
+    spare_workspace(&args.scene, &outputs)?;
+    let folder = match &shared.run.working_folder {
+        Some(folder) => folder.clone(),
+        None if args.scene.is_dir() => own_folder(&args.scene),
+        None => PathBuf::new(),
+    };
     let depth_maps_only = match shared.estimation.fusion_mode {
         0 => false,
         1 => true,
@@ -49,7 +55,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         depth_maps_only,
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion()?,
-        outputs: outputs(&shared.labels.output, cloud, Some(scene)),
+        outputs,
     })
 }
 

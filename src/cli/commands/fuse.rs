@@ -1,11 +1,12 @@
 //! `semvs fuse`.
 
-use super::{cloud_path, conclude, default_cloud, is_typed, outputs, resolver};
+use super::{cloud_path, conclude, default_cloud, is_typed, outputs, resolver, spare_workspace};
 use crate::cli::listen::Recorder;
 use crate::cli::resolve::Resolver;
-use crate::cli::semvs_args::FuseArgs;
+use crate::cli::semvs_args::{ColmapPass, FuseArgs};
 use crate::error::Result;
-use crate::pipeline::{self, FuseJob};
+use crate::pipeline::{self, DepthMapsJob, FuseJob};
+use crate::store::colmap::Pass;
 use clap::ArgMatches;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,12 +22,9 @@ fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<F
     let shared = &args.shared;
     let folder = shared.run.working_folder.clone().unwrap_or_default();
     let size_is_typed = ["resolution-level", "max-resolution", "min-resolution"];
-    let depth_maps = match &args.depth_maps {
-        Some(folder) => folder.clone(),
-        None if folder.as_os_str().is_empty() => PathBuf::from("."),
-        None => folder.clone(),
-    };
     let cloud = args.output.as_deref().map_or_else(|| Ok(default_cloud(&args.scene)), cloud_path)?;
+    let outputs = outputs(&shared.labels.output, cloud, None);
+    spare_workspace(&args.scene, &outputs)?;
     Ok(FuseJob {
         input: resolver.scene(args.scene.clone(), folder)?,
         resolution: size_is_typed
@@ -34,8 +32,22 @@ fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<F
             .any(|option| is_typed(typed, option))
             .then(|| resolver.resolution())
             .transpose()?,
-        depth_maps,
+        depth_maps: depth_maps(args),
         fusion: resolver.fusion()?,
-        outputs: outputs(&shared.labels.output, cloud, None),
+        outputs,
     })
+}
+
+fn depth_maps(args: &FuseArgs) -> DepthMapsJob {
+    let pass = args.maps.map(|maps| match maps {
+        ColmapPass::Geometric => Pass::Geometric,
+        ColmapPass::Photometric => Pass::Photometric,
+    });
+    match (&args.depth_maps, &args.shared.run.working_folder) {
+        (Some(folder), _) => DepthMapsJob::Folder(folder.clone()),
+        (None, _) if pass.is_some() => DepthMapsJob::Colmap(pass),
+        (None, Some(folder)) if !folder.as_os_str().is_empty() => DepthMapsJob::Folder(folder.clone()),
+        (None, _) if args.scene.is_dir() => DepthMapsJob::Colmap(None),
+        (None, _) => DepthMapsJob::Folder(PathBuf::from(".")),
+    }
 }

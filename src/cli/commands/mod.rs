@@ -21,6 +21,7 @@ use crate::pipeline::{DEPTH_MAP, Outputs, SceneArchive};
 use crate::report::{OutputReport, RunReport};
 use crate::store::atomic::write_file;
 use crate::store::cloud::PlyLayout;
+use crate::store::colmap::Workspace;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use serde_json::{Map, Value};
@@ -37,9 +38,33 @@ fn cloud_path(typed: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The cloud of a scene when `-o` is not given: `SCENE_dense.ply` beside it.
+/// The cloud of a scene when `-o` is not given: `SCENE_dense.ply` beside it; for a COLMAP workspace
+/// `semvs/dense.ply` in it.
 fn default_cloud(scene: &Path) -> PathBuf {
+    if scene.is_dir() {
+        return own_folder(scene).join("dense.ply");
+    }
     crate::cli::values::with_suffix(&scene.with_extension(""), "_dense.ply")
+}
+
+/// The folder in a COLMAP workspace that holds what this program makes.
+fn own_folder(workspace: &Path) -> PathBuf {
+    workspace.join("semvs")
+}
+
+/// Refuses outputs in the place of COLMAP's own files, if the scene is a COLMAP workspace.
+fn spare_workspace(scene: &Path, outputs: &Outputs) -> Result<()> {
+    if !scene.is_dir() {
+        return Ok(());
+    }
+    let workspace = Workspace::at(scene, None)?;
+    let paths = [Some(&outputs.cloud), outputs.scene.as_ref(), outputs.report.as_ref()];
+    match paths.into_iter().flatten().find(|path| workspace.owns(path)) {
+        Some(path) => {
+            Err(Error::content(path, "this is a file of COLMAP; choose another name for the output"))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Whether an option was typed, by its long name.
