@@ -4,6 +4,7 @@
 #![deny(unsafe_code)]
 
 pub mod cli;
+pub mod cloud_filter;
 pub mod depth_filter;
 mod error;
 pub mod evaluate;
@@ -16,5 +17,6 @@ pub mod scene;
 pub mod semantics;
 pub mod stereo;
 pub mod store;
+pub mod sub_scenes;
 
 pub use error::{Error, Result};

@@ -17,6 +17,8 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ("depth_filter", &["geometry", "scene", "semantics"]),
     ("fusion", &["geometry", "scene", "semantics"]),
     ("evaluate", &["geometry", "scene", "semantics"]),
+    ("cloud_filter", &["geometry", "scene"]),
+    ("sub_scenes", &["geometry", "scene"]),
     ("store", &["geometry", "scene", "semantics"]),
     ("report", &["evaluate", "scene", "semantics"]),
     (
@@ -29,6 +31,8 @@ const IMPORTS: &[(&str, &[&str])] = &[
             "depth_filter",
             "fusion",
             "evaluate",
+            "cloud_filter",
+            "sub_scenes",
             "store",
             "report",
         ],
@@ -65,7 +69,17 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
 ];
 
 /// Modules that never touch a file, the clock, the environment or the console.
-const PURE: &[&str] = &["geometry", "scene", "semantics", "stereo", "depth_filter", "fusion", "evaluate"];
+const PURE: &[&str] = &[
+    "geometry",
+    "scene",
+    "semantics",
+    "stereo",
+    "depth_filter",
+    "fusion",
+    "evaluate",
+    "cloud_filter",
+    "sub_scenes",
+];
 
 /// What touches them.
 const IMPURE: &[&str] =

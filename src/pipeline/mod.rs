@@ -6,6 +6,7 @@ mod densify;
 mod estimate;
 mod evaluate;
 mod filter;
+mod finished;
 mod fuse;
 mod fusing;
 mod images;
@@ -17,13 +18,16 @@ mod problem;
 mod record;
 mod skip;
 mod sparse;
+mod split;
 
 pub use actions::{export_neighbors, export_roi, import_roi};
 pub use convert::{ConvertJob, convert};
 pub use densify::{DEPTH_MAP, densify};
 pub use evaluate::{EvaluateJob, evaluate};
+pub use finished::{CloudJob, CloudWork, finished_cloud};
 pub use fuse::fuse;
 pub use job::{
     AcrossViews, DensifyJob, DepthMapsJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob,
     SceneArchive, SceneJob,
 };
+pub use split::{SplitJob, split_scene};

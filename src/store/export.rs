@@ -5,7 +5,7 @@ use super::import::LoadedScene;
 use super::paths::{SearchPath, clean_name, name_relative_to};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Roi};
-use crate::scene::{Neighbor, PointSource, Scene, ViewNeighbors};
+use crate::scene::{Neighbor, PointSource, Scene, ViewIndex, ViewNeighbors};
 use semvs_formats::mvs::{self, NEWEST_VERSION, NO_ID};
 use std::path::Path;
 
@@ -75,6 +75,43 @@ pub fn project_archive(
     })?;
     archive.points = points;
     Ok(archive)
+}
+
+/// Leaves in `archive` only the images of `views` (ascending), with their neighbours among them, the points that at least
+/// two of them see, and `roi` as the region of interest.
+pub fn restrict_archive(archive: &mut mvs::Scene, views: &[ViewIndex], roi: &Roi) {
+    const MIN_VIEWS: usize = 2;
+    let mut place = vec![None; archive.images.len()];
+    for (i, view) in views.iter().enumerate() {
+        place[view.index()] = Some(i as u32);
+    }
+    let remaining = |image: u32| place.get(image as usize).copied().flatten();
+    let images = std::mem::take(&mut archive.images);
+    archive.images = images.into_iter().zip(&place).filter(|(_, p)| p.is_some()).map(|(i, _)| i).collect();
+    for image in &mut archive.images {
+        let scores = std::mem::take(&mut image.view_scores);
+        let moved = |s: mvs::ViewScore| Some(mvs::ViewScore { image: remaining(s.image)?, ..s });
+        image.view_scores = scores.into_iter().filter_map(moved).collect();
+    }
+    let all = std::mem::take(&mut archive.points);
+    let (mut images, mut weights) = (Vec::new(), Vec::new());
+    for (i, &position) in all.positions.iter().enumerate() {
+        images.clear();
+        weights.clear();
+        for (k, &image) in all.views.images_of(i).iter().enumerate() {
+            if let Some(image) = remaining(image) {
+                images.push(image);
+                weights.extend(all.views.weights_of(i).get(k));
+            }
+        }
+        if images.len() >= MIN_VIEWS {
+            archive.points.positions.push(position);
+            archive.points.normals.extend(all.normals.get(i));
+            archive.points.colors.extend(all.colors.get(i));
+            archive.points.views.push(&images, &weights);
+        }
+    }
+    archive.obb = Some(export_roi(roi));
 }
 
 /// Makes the names of images and masks in `archive`, which are relative to `from`, relative to `to`.

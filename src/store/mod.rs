@@ -17,3 +17,4 @@ pub mod labels;
 pub mod masks;
 pub mod paths;
 pub mod spool;
+pub mod stored_cloud;

@@ -45,19 +45,19 @@ pub(crate) struct Actions {
     /// Write the neighbour lists as text and exit
     #[arg(long, value_name = "FILE")]
     pub(crate) output_view_neighbors_file: Option<PathBuf>,
-    /// Export the cloud with scale and exit: not available
+    /// Above 0: export the cloud with the pixel size at every point, times this, and exit
     #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) estimate_scale: f32,
-    /// Split the scene and exit: not available
+    /// Above 0: split the scene into parts of at most this area by its depth maps, and exit
     #[arg(long, value_name = "AREA", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) sub_scene_area: f32,
     /// Sample a mesh and exit: not available
     #[arg(long, value_name = "N", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) sample_mesh: f32,
-    /// Below 0: filter a finished cloud and exit: not available; above 0: no effect
+    /// Below 0: remove the points of a finished cloud whose visibility is at most this, and exit; above 0: no effect
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub(crate) filter_point_cloud: i32,
-    /// Export points with this many views and exit: not available
+    /// Export the points seen by at least this many views and exit; below 0: the scene too
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub(crate) export_number_views: i32,
     /// Mesh that neighbours are derived from: not available
@@ -69,7 +69,7 @@ pub(crate) struct Actions {
     /// Put this region of interest into the scene and exit
     #[arg(long, value_name = "FILE", hide = true)]
     pub(crate) import_roi_file: Option<PathBuf>,
-    /// Export depth maps as images and exit: not available
+    /// Render depth maps of a mesh and exit: not available
     #[arg(long, value_name = "NAME", hide = true)]
     pub(crate) export_depth_maps_name: Option<String>,
 }

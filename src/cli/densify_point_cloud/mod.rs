@@ -1,5 +1,6 @@
 //! The program `DensifyPointCloud`: OpenMVS's command line before this library's pipeline.
 
+mod actions;
 mod args;
 mod config_file;
 mod front;

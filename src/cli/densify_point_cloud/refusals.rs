@@ -19,24 +19,12 @@ pub(crate) fn check(args: &DropInArgs) -> Result<(), String> {
             "--fusion-mode",
             "disparity maps are not available; use 0 (everything) or 1 (depth maps only)",
         ),
-        (actions.estimate_scale > 0.0, "--estimate-scale", "exporting points with scale is not available"),
-        (actions.sub_scene_area > 0.0, "--sub-scene-area", "splitting a scene is not available"),
         (actions.sample_mesh != 0.0, "--sample-mesh", "meshes are not read"),
-        (
-            actions.filter_point_cloud < 0,
-            "--filter-point-cloud",
-            "filtering a finished cloud by visibility is not available",
-        ),
-        (
-            actions.export_number_views != 0,
-            "--export-number-views",
-            "exporting points by their number of views is not available",
-        ),
         (actions.mesh_file.is_some(), "--mesh-file", "meshes are not read"),
         (
             actions.export_depth_maps_name.is_some(),
             "--export-depth-maps-name",
-            "exporting depth maps as images is not available",
+            "it renders depth maps of a mesh, and meshes are not read",
         ),
     ];
     match refusals.iter().find(|(asked, _, _)| *asked) {
@@ -61,11 +49,7 @@ mod tests {
             "--archive-type=-2",
             "--fusion-mode=-1",
             "--fusion-mode=-2",
-            "--estimate-scale=1",
-            "--sub-scene-area=660000",
             "--sample-mesh=-5",
-            "--filter-point-cloud=-20",
-            "--export-number-views=3",
             "--mesh-file=m.ply",
             "--export-depth-maps-name=x",
         ] {

@@ -2,7 +2,7 @@
 
 use super::front::{self, Typing};
 use super::log::Log;
-use super::{help, refusals};
+use super::{actions, help, refusals};
 use crate::cli::commands::write_report;
 use crate::cli::duration::Moment;
 use crate::cli::listen::Recorder;
@@ -11,7 +11,6 @@ use crate::cli::resolve::{self, Resolver};
 use crate::cli::values::{openmvs_path, under, with_suffix};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
-use crate::progress::Progress;
 use crate::report::{RunReport, class_table};
 use crate::store::atomic::create_folder;
 use crate::store::cloud::PlyLayout;
@@ -78,33 +77,12 @@ fn run(typing: &Typing, folder: &Path, log: &Log, recorder: &Arc<Recorder>) -> R
     let progress = recorder.progress();
     resolver.remarks.iter().for_each(|remark| progress.warn(remark.as_str()));
     let job = job(typing, folder, input, &resolver)?;
-    if act(typing, folder, &job, &progress)? {
+    if actions::act(typing, folder, &job, &progress)? {
         return Ok(());
     }
     let mut report = pipeline::densify(&job, resolve::cpu()?, &progress)?;
     report.warnings = recorder.warnings();
     conclude(report, &job, typing, log)
-}
-
-/// Does the first of the small jobs that were asked for, in OpenMVS's order; `false`: densify.
-fn act(typing: &Typing, folder: &Path, job: &DensifyJob, progress: &Progress) -> Result<bool> {
-    let actions = &typing.args.actions;
-    let place = |typed: &Option<PathBuf>| typed.as_deref().map(|path| front::resolve(folder, path));
-    if let (Some(region), Some(scene)) = (place(&actions.import_roi_file), &job.outputs.scene) {
-        pipeline::import_roi(&job.input, &region, scene, progress)?;
-        return Ok(true);
-    }
-    if let Some(path) = place(&actions.export_roi_file) {
-        if pipeline::export_roi(&job.input, &path, progress)? {
-            return Ok(true);
-        }
-        progress.warn(format!("{}: not written, the scene has no region of interest", path.display()));
-    }
-    if let Some(path) = place(&actions.output_view_neighbors_file) {
-        pipeline::export_neighbors(&job.input, &path, progress)?;
-        return Ok(true);
-    }
-    Ok(false)
 }
 
 fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) -> Result<DensifyJob> {
