@@ -213,3 +213,22 @@ fn a_scene_that_is_small_enough_is_not_split() {
     let scratch = Scratch::facade6();
     scratch.densify_point_cloud("scene.mvs --sub-scene-area 100").fails_naming(&["--fusion-mode 1"]);
 }
+
+#[test]
+fn one_neighbour_each_is_chosen_for_all_images_together() {
+    let scratch = Scratch::facade6();
+    let words = "scene.mvs --resolution-level 2 --min-resolution 100 --estimate-roi 0 --number-views 1 \
+                 --geometric-iters 0 --number-views-fuse 2 -v 2";
+    let out = scratch.densify_point_cloud(&format!("{words} --max-threads 2")).ok();
+    assert!(out.stdout.contains("paired with 1 views") && !out.stdout.contains("paired with 2 views"));
+    let first = scratch.read("scene_dense.ply");
+    assert!(cloud(&scratch, "scene_dense.ply").len() > 1000);
+    for old in scratch.files().iter().filter(|f| f.ends_with(".dmap")) {
+        std::fs::remove_file(scratch.path(old)).unwrap();
+    }
+    // Free of cost for what others choose, every image takes its best neighbour: another choice.
+    scratch.write("Densify.ini", "Pairwise Mul = 0\n");
+    let free = scratch.densify_point_cloud(&format!("{words} --dense-config-file Densify.ini")).ok();
+    assert!(!free.stdout.contains("no effect"), "{}", free.stdout);
+    assert_ne!(scratch.read("scene_dense.ply"), first);
+}

@@ -34,7 +34,8 @@ pub(crate) struct ImageOptions {
     /// Do not halve below this longest side, in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 640)]
     pub(crate) min_resolution: u32,
-    /// Number of neighbour images each image is matched with; 0 = all good ones (at most 12)
+    /// Number of neighbour images each image is matched with; 0 = all good ones (at most 12),
+    /// 1 = one each, chosen for all images together
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub(crate) number_views: u32,
     /// Text file "ID n0 n1 ..." per line; replaces the neighbours of these images

@@ -7,7 +7,7 @@ use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions};
 use crate::pipeline::{AcrossViews, FilterJob, LabelJob, MaskJob, RoiJob, SceneJob};
-use crate::scene::{NeighborOptions, OutsideRoi, ResolutionOptions, RoiEstimation};
+use crate::scene::{NeighborOptions, OutsideRoi, PairingOptions, ResolutionOptions, RoiEstimation};
 use crate::semantics::{ClassRules, Consistency};
 use crate::stereo::{CpuLevel, StereoOptions};
 use crate::store::cloud::PlyLayout;
@@ -88,6 +88,11 @@ impl<'a> Resolver<'a> {
             min_angle_deg: config.min_angle_deg,
             best_angle_deg: config.optim_angle_deg,
             max_angle_deg: config.max_angle_deg,
+            pairing: PairingOptions {
+                pairwise: config.pairwise_mul,
+                eps: config.optimizer_eps,
+                max_iterations: config.optimizer_max_iters as usize,
+            },
         };
         options.check()?;
         Ok(options)

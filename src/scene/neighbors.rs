@@ -1,6 +1,7 @@
 //! Which views to match a view with: scores from shared sparse points.
 
 use super::neighbor_scores::{ScoreContext, score_view};
+use super::pairing::{PairingOptions, choose_pairs};
 use super::{Neighbor, Scene, ViewIndex};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -21,7 +22,8 @@ pub enum OutsideRoi {
 /// Options of view selection. The defaults are OpenMVS's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeighborOptions {
-    /// Most neighbours to match with; 0 = all retained ones. 1 takes the best one. Default 5.
+    /// Most neighbours to match with; 0 = all retained ones; 1 = the one of the choice described at
+    /// [`PairingOptions`]. Default 5.
     pub number_views: usize,
     /// A view with fewer neighbours is not estimated (lowered to the number of calibrated views − 1). Default 2.
     pub min_views: usize,
@@ -43,6 +45,8 @@ pub struct NeighborOptions {
     pub best_angle_deg: f32,
     /// Mean triangulation angles are below this, in degrees. Default 65.
     pub max_angle_deg: f32,
+    /// The choice of one neighbour per view, if only one is wanted.
+    pub pairing: PairingOptions,
 }
 
 impl Default for NeighborOptions {
@@ -59,6 +63,7 @@ impl Default for NeighborOptions {
             min_angle_deg: 3.0,
             best_angle_deg: 12.0,
             max_angle_deg: 65.0,
+            pairing: PairingOptions::default(),
         }
     }
 }
@@ -84,7 +89,7 @@ impl NeighborOptions {
         ];
         match rules.iter().find(|(holds, _)| !holds) {
             Some((_, rule)) => Err(Error::invalid(*rule)),
-            None => Ok(()),
+            None => self.pairing.check(),
         }
     }
 }
@@ -134,7 +139,12 @@ pub fn select_neighbors(
     }
     let context = ScoreContext::new(scene, cameras, options);
     let views = (0..scene.views.len()).into_par_iter();
-    Ok(views.map_init(|| context.scratch(), |scratch, i| select_for_view(&context, i, scratch)).collect())
+    let selected = views.map_init(|| context.scratch(), |scratch, i| select_for_view(&context, i, scratch));
+    let mut selected: Vec<ViewNeighbors> = selected.collect();
+    if options.number_views == 1 {
+        choose_pairs(&mut selected, &options.pairing);
+    }
+    Ok(selected)
 }
 
 /// Replaces the neighbours of views by given ones, best first, with the scores that OpenMVS gives such entries: no
