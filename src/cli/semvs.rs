@@ -12,40 +12,53 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 /// Runs `semvs` with the words of its command line, the program's name first. Results go to stdout, everything
-/// else to stderr; every failure is one line and exit code 1.
+/// else to stderr; every failure is one line and exit code 1, or 2 where 1 is an answer (`compare`).
 pub fn semvs(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let failure = failure_of(&words);
     let matches = match SemvsArgs::command().try_get_matches_from(words) {
         Ok(matches) => matches,
-        Err(error) => return refuse(&error),
+        Err(error) => return refuse(&error, failure),
     };
     let args = match SemvsArgs::from_arg_matches(&matches) {
         Ok(args) => args,
-        Err(error) => return refuse(&error),
+        Err(error) => return refuse(&error, failure),
     };
     let console = Console::new(Level::of(args.verbose, args.quiet));
     let recorder = Recorder::start(Arc::new(console));
     match run(&args, &matches, &recorder) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             complain(&format!("error: {error}\n"));
-            ExitCode::FAILURE
+            failure
         }
     }
 }
 
-fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crate::Result<()> {
-    let Some((_, typed)) = matches.subcommand() else { return Ok(()) };
+/// The exit code of failures of the command that `words` name.
+fn failure_of(words: &[OsString]) -> ExitCode {
+    let is_option = |word: &&OsString| word.to_string_lossy().starts_with('-');
+    match words.iter().skip(1).find(|word| !is_option(word)) {
+        Some(command) if command == "compare" => ExitCode::from(commands::INCOMPARABLE),
+        _ => ExitCode::FAILURE,
+    }
+}
+
+fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crate::Result<ExitCode> {
+    let Some((_, typed)) = matches.subcommand() else { return Ok(ExitCode::SUCCESS) };
     match &args.command {
+        Command::Compare(args) => return commands::compare(args),
         Command::Densify(args) => commands::densify(args, typed, recorder),
         Command::Fuse(args) => commands::fuse(args, typed, recorder),
         Command::Convert(args) => commands::convert(args, &recorder.progress()),
         Command::Inspect(args) => commands::inspect(args),
         Command::Evaluate(args) => commands::evaluate(args),
-    }
+    }?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Help and version are results; anything else is a mistake on the command line.
-fn refuse(error: &clap::Error) -> ExitCode {
+fn refuse(error: &clap::Error, failure: ExitCode) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
             print(&error.render().to_string());
@@ -53,11 +66,11 @@ fn refuse(error: &clap::Error) -> ExitCode {
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             complain(&error.render().to_string());
-            ExitCode::FAILURE
+            failure
         }
         _ => {
             complain(&format!("error: {}; see semvs --help\n", one_line(error)));
-            ExitCode::FAILURE
+            failure
         }
     }
 }

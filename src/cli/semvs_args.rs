@@ -46,6 +46,7 @@ pub(crate) enum Command {
     Convert(ConvertArgs),
     Inspect(InspectArgs),
     Evaluate(EvaluateArgs),
+    Compare(CompareArgs),
 }
 
 /// Make a dense cloud from a scene: depth maps, filters, fusion
@@ -213,3 +214,37 @@ pub(crate) struct EvaluateArgs {
 const EVALUATE_EXAMPLES: &str = "\
 Example:
   semvs evaluate cloud.ply --truth truth.ply --thresholds 0.02 0.05 0.1";
+
+/// Say how two results differ: scenes, depth maps or folders of them, clouds
+///
+/// A is the result in question, B what it should be. Folders hold depth maps, which are paired by file name. Files may
+/// be compressed (.zst). Reported are counts, shares and percentiles of the differences, and the first element that
+/// differs.
+///
+/// Exit code: 0 if the two can be compared and, with --expect, all figures are within their limits; 1 if one is
+/// outside; 2 if the two cannot be compared or the expect file is at fault.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = COMPARE_EXAMPLES)]
+pub(crate) struct CompareArgs {
+    /// Scene (.mvs), depth map (.dmap), folder of depth maps, or cloud (.ply)
+    #[arg(value_name = "A")]
+    pub(crate) a: PathBuf,
+    /// What A is compared with, of the same kind
+    #[arg(value_name = "B")]
+    pub(crate) b: PathBuf,
+    /// Limits on the figures, which decide the exit code; see docs/regression-testing.md
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) expect: Option<PathBuf>,
+    /// Scene of the clouds: distances are reported relative to depth too
+    #[arg(long, value_name = "SCENE.mvs")]
+    pub(crate) scene: Option<PathBuf>,
+    /// As JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const COMPARE_EXAMPLES: &str = "\
+Examples:
+  semvs compare depthmaps reference/depthmaps --expect depth-maps.toml
+  semvs compare cloud.ply reference/cloud.ply.zst --scene scene.mvs --json
+  semvs compare scene_dense.mvs reference/scene_dense.mvs";

@@ -10,8 +10,10 @@ pub use cloud::{
     ClassScore, ClassScores, CloudScoreOptions, CloudScores, DistanceScore, LabelledPoints, cloud_scores,
 };
 pub use compare::{
-    Agreement, CloudComparison, CompareOptions, Differences, FirstDifference, MapComparison, compare_clouds,
-    compare_maps,
+    Agreement, CLOUD_FIGURES, Catalog, CloudComparison, ComparedImage, ComparedScene, Comparison,
+    Differences, FOLDER_FIGURES, Figure, Figures, FirstDifference, Kind, Limit, MAP_FIGURES, MapComparison,
+    Part, SCENE_FIGURES, Shape, Tolerance, Violation, check_limits, compare_clouds, compare_maps,
+    compare_scenes, folder_figures, names,
 };
 pub use labels::LabelScores;
 pub use maps::{MapScoreOptions, MapScores, map_scores};

@@ -1,6 +1,7 @@
 //! The jobs of the programs. The only module that knows the order of the stages.
 
 mod actions;
+pub mod compare;
 mod convert;
 mod densify;
 mod estimate;

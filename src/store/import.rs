@@ -114,7 +114,7 @@ fn import_views(
 
 /// Pose and intrinsics of an image: `R = Rc Rp`, `C = Rpᵀ Cc + Cp`; `None` if it is uncalibrated or an index is
 /// out of range.
-fn import_calibration(archive: &mvs::Scene, image: &mvs::Image) -> Option<Calibration> {
+pub(crate) fn import_calibration(archive: &mvs::Scene, image: &mvs::Image) -> Option<Calibration> {
     if image.pose == NO_ID {
         return None;
     }
@@ -191,7 +191,7 @@ fn import_tracks(archive: &mvs::Scene) -> Tracks {
 }
 
 /// The stored box, in the single precision that it is used with.
-fn import_roi(obb: &mvs::Obb) -> Roi {
+pub(crate) fn import_roi(obb: &mvs::Obb) -> Roi {
     let single = |v: f64| f64::from(v as f32);
     Roi {
         rotation: Matrix3::from_row_slice(&obb.rotation).map(single),

@@ -15,6 +15,7 @@ mod jpeg;
 mod label_png;
 pub mod labels;
 pub mod masks;
+pub mod packed;
 pub mod paths;
 pub mod spool;
 pub mod stored_cloud;

@@ -1,11 +1,13 @@
 //! The commands of `semvs`: from typed options to a job, and from its outcome to text.
 
+mod compare;
 mod convert;
 mod densify;
 mod evaluate;
 mod fuse;
 mod inspect;
 
+pub(crate) use compare::{INCOMPARABLE, compare};
 pub(crate) use convert::convert;
 pub(crate) use densify::densify;
 pub(crate) use evaluate::evaluate;

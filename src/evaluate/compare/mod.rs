@@ -1,39 +1,103 @@
 //! How two results differ, element by element: for regression tests against an earlier run or another program.
 
 mod clouds;
+mod figures;
+mod limits;
 mod maps;
+mod scenes;
 
-pub use clouds::{CloudComparison, compare_clouds};
-pub use maps::{MapComparison, compare_maps};
+pub use clouds::{CLOUD_FIGURES, CloudComparison, compare_clouds};
+pub use figures::{Catalog, Figure, Figures, Shape, names};
+pub use limits::{Limit, Violation, check_limits};
+pub use maps::{FOLDER_FIGURES, MAP_FIGURES, MapComparison, compare_maps, folder_figures};
+pub use scenes::{ComparedImage, ComparedScene, SCENE_FIGURES, compare_scenes};
 
 use crate::error::{Error, Result};
 use serde::Serialize;
 
+/// What two results are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Scene files.
+    Scenes,
+    /// Depth maps, or folders of them.
+    DepthMaps,
+    /// Clouds.
+    Clouds,
+}
+
+impl Kind {
+    /// The name in reports and expect files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Scenes => "scenes",
+            Kind::DepthMaps => "depth-maps",
+            Kind::Clouds => "clouds",
+        }
+    }
+
+    /// What is reported once for the whole, and what is reported of every part.
+    pub fn catalogs(self) -> (Catalog, Catalog) {
+        match self {
+            Kind::Scenes => (SCENE_FIGURES, &[]),
+            Kind::DepthMaps => (FOLDER_FIGURES, MAP_FIGURES),
+            Kind::Clouds => (CLOUD_FIGURES, &[]),
+        }
+    }
+}
+
+/// How two results differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// What they are.
+    pub kind: Kind,
+    /// Numbers about the whole.
+    pub figures: Figures,
+    /// What numbers do not say, a line each.
+    pub notes: Vec<String>,
+    /// The first element that differs by more than the tolerances.
+    pub first: Option<FirstDifference>,
+    /// The pairs of depth maps, by file name; empty for scenes and clouds.
+    pub parts: Vec<Part>,
+}
+
+/// How two depth maps of the same file name differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Part {
+    /// The file name.
+    pub name: String,
+    /// Numbers about the pair.
+    pub figures: Figures,
+    /// What numbers do not say, a line each.
+    pub notes: Vec<String>,
+    /// The first pixel that differs by more than the tolerances.
+    pub first: Option<FirstDifference>,
+}
+
 /// Up to which difference two values count as the same when the first differing element is looked for. All default
 /// to 0: any difference counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CompareOptions {
-    /// Relative difference of depths.
-    pub depth: f64,
-    /// Distance of positions as a share of the diagonal of the second cloud's bounding box.
+pub struct Tolerance {
+    /// Relative difference of depths, confidences, weights and scores.
+    pub relative: f64,
+    /// Distance of positions as a share of the diagonal of the second result's bounding box.
     pub position: f64,
-    /// Angle between normals, degrees.
-    pub normal_deg: f64,
+    /// Angle between normals or rotations, degrees.
+    pub angle: f64,
     /// Difference of a colour channel, levels.
-    pub color: u8,
-    /// Relative difference of confidences and weights.
-    pub confidence: f64,
+    pub color: f64,
 }
 
-impl CompareOptions {
+impl Tolerance {
     /// # Errors
     /// [`Error::Invalid`] for a tolerance that is not a number of at least 0.
     pub fn check(&self) -> Result<()> {
         let tolerances = [
-            ("depth", self.depth),
+            ("relative", self.relative),
             ("position", self.position),
-            ("normal", self.normal_deg),
-            ("confidence", self.confidence),
+            ("angle", self.angle),
+            ("color", self.color),
         ];
         match tolerances.iter().find(|(_, v)| !(v.is_finite() && *v >= 0.0)) {
             Some((name, v)) => {
@@ -63,6 +127,8 @@ pub struct Differences {
     pub p9999: f64,
     /// The largest difference; infinite (`null` in JSON) where only one value is a number.
     pub max: f64,
+    /// Shares of the elements that differ by at most 1e-6, 1e-3 and 1e-2.
+    pub within: [f64; 3],
 }
 
 impl Differences {
@@ -81,6 +147,8 @@ impl Differences {
             p999: at(9990),
             p9999: at(9999),
             max,
+            within: [1e-6, 1e-3, 1e-2]
+                .map(|limit| values.partition_point(|v| *v <= limit) as f64 / values.len() as f64),
         })
     }
 }
@@ -104,8 +172,8 @@ impl Agreement {
 /// The first element, in file order, that differs by more than the tolerances.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FirstDifference {
-    /// Position of the element: point number, or pixel number row by row.
-    pub index: usize,
+    /// The element: "pixel (12, 7)", "point 31", "image 3, neighbour 2", ...
+    pub place: String,
     /// What differs: "position", "depth", "views", ...
     pub attribute: &'static str,
     /// Its value in the first result.
@@ -114,14 +182,24 @@ pub struct FirstDifference {
     pub b: String,
 }
 
-impl FirstDifference {
-    fn new(
-        index: usize,
+/// Looks for the first difference.
+#[derive(Default)]
+struct Finder(Option<FirstDifference>);
+
+impl Finder {
+    /// Notes the values `a` and `b` of `attribute`, if they differ and are the first that do.
+    fn note(
+        &mut self,
+        differs: bool,
+        place: impl FnOnce() -> String,
         attribute: &'static str,
-        a: &impl std::fmt::Debug,
-        b: &impl std::fmt::Debug,
-    ) -> Self {
-        FirstDifference { index, attribute, a: format!("{a:?}"), b: format!("{b:?}") }
+        a: &dyn std::fmt::Debug,
+        b: &dyn std::fmt::Debug,
+    ) {
+        if differs && self.0.is_none() {
+            let (a, b) = (format!("{a:?}"), format!("{b:?}"));
+            self.0 = Some(FirstDifference { place: place(), attribute, a, b });
+        }
     }
 }
 
@@ -154,6 +232,16 @@ fn angle_deg(a: [f32; 3], b: [f32; 3]) -> f64 {
     if angle.is_nan() || a.norm() == 0.0 || b.norm() == 0.0 { 180.0 } else { angle }
 }
 
+/// Angle of the rotation from `a` to `b`, degrees; infinite where one is no matrix of numbers.
+fn rotation_deg(a: &nalgebra::Matrix3<f64>, b: &nalgebra::Matrix3<f64>) -> f64 {
+    if a == b {
+        return 0.0;
+    }
+    // |A - B| (Frobenius) is 2 sqrt(2) sin(angle / 2), which is exact for small angles.
+    let angle = 2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin().to_degrees();
+    if angle.is_nan() { f64::INFINITY } else { angle }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,6 +254,8 @@ mod tests {
             (10_000.0, 18_000.0, 19_800.0, 19_980.0, 19_998.0)
         );
         assert_eq!((d.compared, d.equal, d.max), (20_000, 0, 20_000.0));
+        let within = Differences::of(vec![0.0, 1e-6, 1e-3, 0.01, 0.1]).unwrap().within;
+        assert_eq!(within, [0.4, 0.6, 0.8]);
         let few = Differences::of(vec![0.0, 0.0, f64::INFINITY]).unwrap();
         assert_eq!((few.equal, few.p50, few.p90, few.max), (2, 0.0, f64::INFINITY, f64::INFINITY));
         assert_eq!(Differences::of(Vec::new()), None);
@@ -190,8 +280,8 @@ mod tests {
 
     #[test]
     fn tolerances_are_checked() {
-        assert!(CompareOptions::default().check().is_ok());
-        let bad = CompareOptions { position: f64::NAN, ..Default::default() };
+        assert!(Tolerance::default().check().is_ok());
+        let bad = Tolerance { position: f64::NAN, ..Default::default() };
         assert!(bad.check().unwrap_err().to_string().contains("position"));
     }
 }
