@@ -80,7 +80,8 @@ fn text(args: &CompareArgs, outcome: &Outcome) -> String {
 
 fn whole(comparison: &Comparison, out: &mut String) {
     details(&comparison.figures, &comparison.notes, comparison.first.as_ref(), out);
-    if comparison.kind == Kind::Clouds && comparison.figures.get("position_of_depth").is_none() {
+    let has = |name: &str| comparison.figures.get(name).is_some();
+    if comparison.kind == Kind::Clouds && has("position") && !has("position_of_depth") {
         out.push_str("(give --scene for distances relative to depth)\n");
     }
 }

@@ -1,7 +1,8 @@
 //! Two depth maps of the same view.
 
 use super::{
-    Catalog, Differences, Figure, Figures, Finder, FirstDifference, Shape, Tolerance, angle_deg, relative,
+    Catalog, Differences, Figure, Figures, Finder, FirstDifference, Shape, Tolerance, angle_deg, file_name,
+    relative,
 };
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -45,7 +46,7 @@ pub struct MapComparison {
     pub width: u32,
     /// Rows of both.
     pub height: u32,
-    /// Fields of the header that differ, with both values.
+    /// Fields of the header that differ, with both values. Of the image name only the file name counts.
     pub header: Vec<String>,
     /// Planes that only one of the two has: `normal`, `confidence`.
     pub planes: Vec<&'static str>,
@@ -186,7 +187,7 @@ fn header_differences(a: &DepthEstimate, b: &DepthEstimate) -> Vec<String> {
         }
     };
     field(a.image_id != b.image_id, "image id", &a.image_id.0, &b.image_id.0);
-    field(a.image_name != b.image_name, "image name", &a.image_name, &b.image_name);
+    field(file_name(&a.image_name) != file_name(&b.image_name), "image name", &a.image_name, &b.image_name);
     field(a.source_ids != b.source_ids, "source ids", &ids(a), &ids(b));
     field(a.depth_range != b.depth_range, "depth range", &a.depth_range, &b.depth_range);
     if a.camera != b.camera {
@@ -238,6 +239,7 @@ mod tests {
         b.normal.as_mut().unwrap()[(2, 1)] = [0.0, -1.0, 0.0];
         b.confidence = None;
         b.source_ids.clear();
+        b.image_name = "images/3.jpg".into();
         let c = compare_maps(&a, &b, &Tolerance::default()).unwrap();
         assert_eq!((c.valid_a, c.valid_b, c.valid_both), (5, 5, 4));
         let figures = c.figures();

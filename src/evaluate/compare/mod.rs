@@ -203,6 +203,11 @@ impl Finder {
     }
 }
 
+/// The last part of a path. Where results were written decides what comes before it.
+fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
 /// `|a − b|` over the larger magnitude; 0 for equal values, infinite where only one is a number.
 fn relative(a: f32, b: f32) -> f64 {
     let (a, b) = (f64::from(a), f64::from(b));

@@ -3,13 +3,14 @@
 use super::clouds::{diagonal, share};
 use super::{
     Catalog, CloudComparison, Differences, Figure, Figures, Finder, FirstDifference, Shape, Tolerance,
-    compare_clouds, relative, rotation_deg,
+    compare_clouds, file_name, relative, rotation_deg,
 };
 use crate::error::Result;
 use crate::geometry::{Roi, Size};
 use crate::scene::{Calibration, ImageId, Neighbor, PointCloud};
 
-/// What a comparison of scenes reports. Images are compared by their position in the file.
+/// What a comparison of scenes reports. Images are compared by their position in the file; of their names and masks only
+/// the file name counts.
 pub const SCENE_FIGURES: Catalog = &[
     ("platforms.a", Shape::One),
     ("platforms.b", Shape::One),
@@ -161,8 +162,9 @@ impl Images {
                 *counter += u64::from(differs);
                 first.note(differs, place, name, a, b);
             };
-        count(a.name != b.name, "name", &mut self.other_name, &a.name, &b.name);
-        count(a.mask != b.mask, "mask", &mut self.other_mask, &a.mask, &b.mask);
+        let other = |a: &str, b: &str| file_name(a) != file_name(b);
+        count(other(&a.name, &b.name), "name", &mut self.other_name, &a.name, &b.name);
+        count(other(&a.mask, &b.mask), "mask", &mut self.other_mask, &a.mask, &b.mask);
         count(a.id != b.id, "id", &mut self.other_id, &a.id.0, &b.id.0);
         let calibrated = (a.calibration.is_some(), b.calibration.is_some());
         let in_one = calibrated.0 != calibrated.1;
@@ -388,6 +390,9 @@ mod tests {
     fn names_ids_depths_and_counts_are_compared() {
         let (f, first) = changed(|b| b.images[0].name = "x".into());
         assert_eq!((number(&f, "images.other_name"), first.b.as_str()), (1.0, "\"x\""));
+        let mut moved = scene();
+        moved.images[0].name = "../images/0.jpg".into();
+        assert_eq!(compare_scenes(&scene(), &moved, &Tolerance::default()).unwrap().2, None);
         let (f, _) = changed(|b| (b.images[0].mask, b.images[0].id) = ("m".into(), ImageId(1)));
         assert_eq!((number(&f, "images.other_mask"), number(&f, "images.other_id")), (1.0, 1.0));
         let (f, first) = changed(|b| b.images[0].depths[1] = 4.0);

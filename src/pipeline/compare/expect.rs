@@ -174,7 +174,7 @@ mod tests {
             ("[limits]\n", "no limits"),
             ("limit.x = 1\n", "limit: the file may have"),
             ("kind = 3\n", "kind"),
-            ("[limits]\ndepth.p99 = 0.5\n", "write depth.p99 = { max"),
+            ("[limits]\ndepth.p99 = 0.5\n", "depth.p99 = { max"),
             ("[limits]\ndepth.p99 = { most = 0.5 }\n", "depth.p99.most"),
             ("[limits]\ndepth.p99 = { max = 'x' }\n", "depth.p99.max: give a number"),
             ("[limits]\ndepth.p99 = { max = nan }\n", "give a number"),
