@@ -41,7 +41,7 @@ pub fn filter_consistency(
     let min_views = options.min_views_filter.min(others);
     let min_adjust = options.min_views_filter_adjust.min(others);
     let available = neighbors.len() as u32;
-    if available < min_views || (options.filter_adjust && available < min_adjust) {
+    if available < min_views || available < min_adjust {
         return reference.estimate.clone();
     }
     if options.filter_adjust {

@@ -130,6 +130,39 @@ mod tests {
     }
 
     #[test]
+    fn irregular_ties_fall_as_in_the_gnu_library() {
+        // (views, distinct scores, FNV-1a hash of the order) as above, over scores from a xorshift generator.
+        let known = [
+            (17, 2, 138625294608479885),
+            (17, 4, 1484447143584918439),
+            (40, 2, 11476617960903788049),
+            (40, 5, 16477457307815274907),
+            (200, 1, 10987860983922977155),
+            (200, 2, 3667350438184020641),
+            (200, 7, 14562236464095186281),
+        ];
+        for (views, distinct, expected) in known {
+            let mut state = 88_172_645_463_325_252_u64 + 1000 * views + distinct;
+            let mut next = || {
+                state ^= state << 13;
+                state ^= state >> 7;
+                state ^= state << 17;
+                1 + (state % distinct) as usize
+            };
+            let scores: Vec<usize> = (0..views).map(|_| next()).collect();
+            let order = by_decreasing_score(&scores);
+            let hash = order
+                .iter()
+                .fold(1469598103934665603_u64, |h, &i| (h ^ i as u64).wrapping_mul(1099511628211));
+            assert_eq!(hash, expected, "{views} views, {distinct} scores: {order:?}");
+            if (views, distinct) == (17, 2) {
+                assert_eq!(scores, [2, 2, 1, 1, 1, 1, 2, 2, 1, 1, 2, 2, 2, 2, 1, 1, 1]);
+                assert_eq!(order, [1, 0, 13, 6, 7, 12, 11, 10, 16, 15, 14, 9, 8, 5, 4, 3, 2]);
+            }
+        }
+    }
+
+    #[test]
     fn seventeen_equal_scores_are_mixed_as_by_one_partition() {
         // Of equal items the median rule picks the middle one (index 8) and swaps it to the front; the partition
         // of the other sixteen places then swaps the pairs (1, 16), (2, 15), ... (8, 9).

@@ -5,7 +5,10 @@ use nalgebra::{Matrix3, Vector3};
 use semvs::Result;
 use semvs::fusion::{FusionMaps, FusionView, MapInfo, MapSource};
 use semvs::geometry::{Camera, Size};
-use semvs::scene::{DepthEstimate, Grid, ImageId, ResolutionOptions, ViewIndex};
+use semvs::scene::{
+    Calibration, CloudLayout, CloudPoint, DepthEstimate, Grid, ImageId, PointCloud, PointSink,
+    ResolutionOptions, ViewIndex,
+};
 use semvs::store::images::load_working_color;
 use semvs_formats::dmap::DepthMapFile;
 use semvs_formats::mvs::{self, Scene};
@@ -109,6 +112,42 @@ impl MapsInMemory {
             .collect();
         MapsInMemory { maps, views }
     }
+}
+
+impl MapsInMemory {
+    /// Where the cameras are.
+    pub(crate) fn calibrations(&self) -> Vec<Option<Calibration>> {
+        let of = |maps: &FusionMaps| {
+            let camera = &maps.estimate.camera;
+            Some(Calibration {
+                normalized_k: *camera.k(),
+                rotation: *camera.rotation(),
+                center: *camera.center(),
+                size: None,
+            })
+        };
+        self.maps.iter().map(of).collect()
+    }
+}
+
+/// The columns of a cloud that OpenMVS writes.
+pub(crate) fn points(cloud: &ply::Cloud) -> PointCloud {
+    let layout =
+        CloudLayout { normals: true, colors: true, views: true, weights: true, ..CloudLayout::default() };
+    let mut points = PointCloud::new(layout);
+    for i in 0..cloud.len() {
+        let views: Vec<ViewIndex> = cloud.images_of(i).iter().map(|&v| ViewIndex(v)).collect();
+        let point = CloudPoint {
+            position: cloud.positions[i],
+            normal: cloud.normals[i],
+            color: cloud.colors[i],
+            views: &views,
+            weights: cloud.weights_of(i),
+            ..CloudPoint::default()
+        };
+        points.push(&point).unwrap();
+    }
+    points
 }
 
 impl MapSource for MapsInMemory {

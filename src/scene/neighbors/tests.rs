@@ -114,6 +114,33 @@ fn points_outside_the_region_count_less_or_nothing() {
 }
 
 #[test]
+fn points_outside_the_region_weigh_seven_tenths() {
+    /// Sums of products in `f32`.
+    const ROUNDING: f32 = 1e-5;
+    let (mut scene, cameras) = row(3);
+    let select = |scene: &Scene, outside_roi| {
+        let options = NeighborOptions { outside_roi, ..Default::default() };
+        select_neighbors(scene, &cameras, &options).unwrap()
+    };
+    let counted = select(&scene, OutsideRoi::Count);
+    // A region without any point in it.
+    scene.roi = crate::geometry::Roi::axis_aligned([-9.0, -9.0, 50.0], [9.0, 9.0, 60.0], 0.0);
+    assert_eq!(select(&scene, OutsideRoi::Count), counted);
+    for (all, less) in counted.iter().zip(select(&scene, OutsideRoi::Discount)) {
+        for (n, m) in all.all.iter().zip(&less.all) {
+            assert!((m.score / n.score - 0.7).abs() < ROUNDING, "{m:?} {n:?}");
+            assert_eq!(Neighbor { score: 0.0, ..*n }, Neighbor { score: 0.0, ..*m });
+        }
+    }
+    assert!(select(&scene, OutsideRoi::Drop).iter().all(|v| v.all.is_empty() && v.tracks.is_empty()));
+    // A region with all points in it.
+    scene.roi = crate::geometry::Roi::axis_aligned([-99.0; 3], [99.0; 3], 0.0);
+    for outside in [OutsideRoi::Count, OutsideRoi::Discount, OutsideRoi::Drop] {
+        assert_eq!(select(&scene, outside), counted);
+    }
+}
+
+#[test]
 fn views_without_a_camera_take_no_part() {
     let (scene, mut cameras) = row(4);
     cameras[1] = None;
