@@ -34,8 +34,11 @@ pub enum Shape {
     Relative,
 }
 
-/// Numbers of differences: name, value.
-const OF_DIFFERENCES: [(&str, fn(&Differences) -> f64); 8] = [
+/// A number of differences: its name, and how it is taken from them.
+type Number = (&'static str, fn(&Differences) -> f64);
+
+/// Numbers of all differences.
+const OF_DIFFERENCES: [Number; 8] = [
     ("compared", |d| d.compared as f64),
     ("equal", |d| d.equal as f64 / d.compared as f64),
     ("p50", |d| d.p50),
@@ -47,7 +50,7 @@ const OF_DIFFERENCES: [(&str, fn(&Differences) -> f64); 8] = [
 ];
 
 /// More numbers of relative differences.
-const OF_RELATIVE: [(&str, fn(&Differences) -> f64); 3] =
+const OF_RELATIVE: [Number; 3] =
     [("within_1e-6", |d| d.within[0]), ("within_1e-3", |d| d.within[1]), ("within_1e-2", |d| d.within[2])];
 
 /// What a kind of comparison can report: name of the quantity, its shape.
@@ -93,9 +96,7 @@ impl Figures {
     pub fn numbers(&self) -> Vec<(String, f64)> {
         let mut numbers = Vec::new();
         for (name, figure) in self.iter() {
-            let of = |d: &Differences, (part, value): (&str, fn(&Differences) -> f64)| {
-                (format!("{name}.{part}"), value(d))
-            };
+            let of = |d: &Differences, (part, value): Number| (format!("{name}.{part}"), value(d));
             match figure {
                 Figure::Count(count) => numbers.push((name.to_owned(), count as f64)),
                 Figure::Number(number) => numbers.push((name.to_owned(), number)),
