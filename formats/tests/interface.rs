@@ -215,6 +215,11 @@ fn bad_indices_and_numbers_are_named() {
     refused(|s| s.points.views.weights = vec![1.0], "views: 1 weights");
     refused(|s| s.platforms[0].cameras[0].k[0] = 0.0, "platforms[0].cameras[0].K: focal");
     refused(|s| s.platforms[0].cameras[0].k[5] = f64::NAN, "platforms[0].cameras[0].K: NaN");
+    refused(|s| s.platforms[0].cameras[0].k[8] = 0.0, "platforms[0].cameras[0].K: not of the form");
+    refused(|s| s.platforms[0].cameras[0].k[3] = 1.0, "platforms[0].cameras[0].K: not of the form");
+    refused(|s| s.platforms[0].cameras[0].k[0] = 1e300, "platforms[0].cameras[0].K: focal lengths 1");
+    refused(|s| s.platforms[0].cameras[0].k[2] = -1e300, "platforms[0].cameras[0].K: skew");
+    refused(|s| s.platforms[0].poses[0].center[0] = 1e300, "platforms[0].poses[0].C: 1");
     refused(|s| s.platforms[0].poses[0].rotation[0] *= -1.0, "platforms[0].poses[0].R: not a rotation");
     refused(|s| s.platforms[0].poses[0].center[2] = f64::INFINITY, "platforms[0].poses[0].C: inf");
     refused(|s| s.platforms[0].cameras[0].height = 0, "platforms[0].cameras[0]: resolution");

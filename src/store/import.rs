@@ -63,6 +63,7 @@ pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result
     let tracks = import_tracks(&archive);
     let repairs = archive.repair().map_err(|e| Error::format(path, e))?;
     warn_of_repairs(path, &repairs);
+    warn_of_remains(path, &archive, file.trailing_bytes);
     archive.check().map_err(|e| Error::format(path, e))?;
     let views = import_views(path, &archive, container, &search)?;
     let calibrated = views.iter().filter(|v| v.calibration.is_some()).count();
@@ -146,6 +147,16 @@ fn size_from_file(calibration: &mut Calibration, container: mvs::Container, imag
         let shift = 0.5 / f64::from(size.longest()) - 0.5;
         k[(0, 2)] += shift;
         k[(1, 2)] += shift;
+    }
+}
+
+/// What of the file is not used.
+fn warn_of_remains(path: &Path, archive: &mvs::Scene, trailing_bytes: u64) {
+    if trailing_bytes > 0 {
+        warn!("{}: {trailing_bytes} bytes after the end of the scene are ignored", path.display());
+    }
+    if archive.stored_box.is_some_and(|stored| stored.is_damaged()) {
+        warn!("{}: its region of interest holds numbers that are not finite and is ignored", path.display());
     }
 }
 

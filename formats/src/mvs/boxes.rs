@@ -54,6 +54,12 @@ impl StoredBox {
         Some(self.as_obb()).filter(Obb::is_valid)
     }
 
+    /// Whether the bytes hold a number that is not finite, which no program means.
+    pub fn is_damaged(&self) -> bool {
+        let Obb { rotation, center, half_extent } = self.as_obb();
+        rotation.iter().chain(&center).chain(&half_extent).any(|v| !v.is_finite())
+    }
+
     /// The numbers of the box, good or bad.
     fn as_obb(&self) -> Obb {
         match *self {

@@ -9,6 +9,13 @@ use crate::{Error, Result};
 /// Largest image side that is believed.
 const MAX_SIDE: u32 = 65_535;
 
+/// Focal lengths that are believed, in units of the longer image side; 0.5 to 5 are usual.
+const FOCAL: std::ops::Range<f64> = 1e-3..1e5;
+/// Largest difference of the lower entries of intrinsics from 0, 0, 0, 1.
+const LAST_ROW_TOLERANCE: f64 = 1e-6;
+/// Largest coordinate of a camera centre; geocentric coordinates in millimetres are below 1e10.
+const FARTHEST: f64 = 1e12;
+
 const ROOT: Place<'static> = Place::Root("");
 
 fn invalid(place: &Place<'_>, what: impl Into<String>) -> Error {
@@ -48,7 +55,7 @@ impl Scene {
             for (i, pose) in platform.poses.iter().enumerate().filter(|&(i, _)| poses[i]) {
                 let at = place.item(i);
                 check_rotation(&pose.rotation, &at.field("R"))?;
-                check_finite(&pose.center, &at.field("C"))?;
+                check_center(&pose.center, &at.field("C"))?;
             }
         }
         Ok(())
@@ -203,13 +210,46 @@ fn check_camera(camera: &Camera, at: &Place<'_>) -> Result<()> {
         return Err(invalid(at, format!("resolution {w}×{h} is not possible")));
     }
     let place = at.field("K");
-    check_finite(&camera.k, &place)?;
-    if camera.k[0] <= 0.0 || camera.k[4] <= 0.0 {
-        let what = format!("focal lengths must be positive, they are {} and {}", camera.k[0], camera.k[4]);
-        return Err(invalid(&place, what));
-    }
+    check_intrinsics(camera, &place)?;
     check_rotation(&camera.rotation, &at.field("R"))?;
-    check_finite(&camera.center, &at.field("C"))
+    check_center(&camera.center, &at.field("C"))
+}
+
+/// Positive focal lengths of a believable size, and a last row of 0, 0, 1.
+fn check_intrinsics(camera: &Camera, place: &Place<'_>) -> Result<()> {
+    let k = &camera.k;
+    check_finite(k, place)?;
+    if k[0] <= 0.0 || k[4] <= 0.0 {
+        return Err(invalid(
+            place,
+            format!("focal lengths must be positive, they are {} and {}", k[0], k[4]),
+        ));
+    }
+    let side = f64::from(camera.width.max(camera.height).max(1));
+    if [k[0], k[4]].iter().any(|f| !FOCAL.contains(&(f / side))) {
+        let what = format!("focal lengths {} and {} are impossible for images of {side} pixels", k[0], k[4]);
+        return Err(invalid(place, what));
+    }
+    if [k[1], k[2], k[5]].iter().any(|v| v.abs() > FOCAL.end * side) {
+        let what = format!("skew {} or principal point ({}, {}) is impossible", k[1], k[2], k[5]);
+        return Err(invalid(place, what));
+    }
+    let below = [k[3], k[6], k[7], k[8] - 1.0];
+    if below.iter().any(|v| v.abs() > LAST_ROW_TOLERANCE) {
+        let what =
+            format!("not of the form [f s c; 0 f c; 0 0 1]: {}, {}, {}, {} below", k[3], k[6], k[7], k[8]);
+        return Err(invalid(place, what));
+    }
+    Ok(())
+}
+
+/// Finite, and near enough for double precision to tell two cameras apart.
+fn check_center(center: &[f64; 3], place: &Place<'_>) -> Result<()> {
+    check_finite(center, place)?;
+    match center.iter().find(|v| v.abs() > FARTHEST) {
+        Some(v) => Err(invalid(place, format!("{v} is too far from the origin, {FARTHEST:e} is the limit"))),
+        None => Ok(()),
+    }
 }
 
 fn check_finite(values: &[f64], place: &Place<'_>) -> Result<()> {
