@@ -29,6 +29,19 @@ pub enum Stage {
     Merge,
 }
 
+/// What a scene file holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SceneSummary {
+    /// Whether it is an interface archive; else it is a project archive.
+    pub interface: bool,
+    /// Images.
+    pub images: usize,
+    /// Images with a pose.
+    pub calibrated: usize,
+    /// Points, sparse or dense.
+    pub points: usize,
+}
+
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -41,12 +54,8 @@ pub enum Event {
     Detail(String),
     /// The scene was read.
     SceneLoaded {
-        /// Images in the scene.
-        images: usize,
-        /// Images with a pose.
-        calibrated: usize,
-        /// Sparse points.
-        points: usize,
+        /// What is in it.
+        scene: SceneSummary,
         /// Time it took.
         elapsed: Duration,
     },
@@ -135,6 +144,8 @@ pub enum Event {
     SceneSaved {
         /// The file.
         path: std::path::PathBuf,
+        /// What is in it.
+        scene: SceneSummary,
         /// Time it took.
         elapsed: Duration,
     },

@@ -1,6 +1,7 @@
 //! What `semvs` says on stderr while it works: lines, and bars on a terminal.
 
 use super::duration;
+use super::one_line::printable;
 use crate::progress::{Event, Listener, Stage};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
@@ -128,7 +129,7 @@ fn name(stage: Stage) -> String {
 impl Listener for Console {
     fn event(&self, event: &Event) {
         match event {
-            Event::Warning(text) => self.say(Level::Warnings, &format!("warning: {text}")),
+            Event::Warning(text) => self.say(Level::Warnings, &format!("warning: {}", printable(text))),
             Event::Detail(_) | Event::DepthEstimated { .. } | Event::DepthFiltered { .. } => {
                 self.say(Level::Detail, &line(event));
             }
@@ -149,13 +150,14 @@ impl Listener for Console {
 fn line(event: &Event) -> String {
     let time = |elapsed: &Duration| duration::text(*elapsed);
     match event {
-        Event::Warning(text) | Event::Info(text) | Event::Detail(text) => text.clone(),
-        Event::SceneLoaded { images, calibrated, points, elapsed } => {
-            format!(
-                "Scene read: {images} images ({calibrated} with a pose), {points} points ({})",
-                time(elapsed)
-            )
-        }
+        Event::Warning(text) | Event::Info(text) | Event::Detail(text) => printable(text),
+        Event::SceneLoaded { scene, elapsed } => format!(
+            "Scene read: {} images ({} with a pose), {} points ({})",
+            scene.images,
+            scene.calibrated,
+            scene.points,
+            time(elapsed)
+        ),
         Event::ImagesPrepared { images, elapsed } => format!("Images ready: {images} ({})", time(elapsed)),
         Event::ViewsSelected { images, .. } => format!("Images with neighbours: {images}"),
         Event::Paired { reference, sources } => {

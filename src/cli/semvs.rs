@@ -2,7 +2,7 @@
 
 use super::console::{Console, Level};
 use super::listen::Recorder;
-use super::one_line::one_line;
+use super::one_line::{one_line, printable};
 use super::semvs_args::{Command, SemvsArgs};
 use super::{commands, complain, print};
 use clap::error::ErrorKind;
@@ -29,7 +29,7 @@ pub fn semvs(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     match run(&args, &matches, &recorder) {
         Ok(code) => code,
         Err(error) => {
-            complain(&format!("error: {error}\n"));
+            complain(&format!("error: {}\n", printable(&error.to_string())));
             failure
         }
     }
@@ -69,7 +69,7 @@ fn refuse(error: &clap::Error, failure: ExitCode) -> ExitCode {
             failure
         }
         _ => {
-            complain(&format!("error: {}; see semvs --help\n", one_line(error)));
+            complain(&format!("error: {}; see semvs --help\n", printable(&one_line(error))));
             failure
         }
     }

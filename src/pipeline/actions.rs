@@ -1,6 +1,7 @@
 //! Small jobs on a scene without depth maps: its region of interest and neighbour lists as text.
 
 use super::job::SceneJob;
+use super::outputs::summary;
 use super::prepare::load;
 use crate::error::{Error, Result};
 use crate::progress::{Event, Progress};
@@ -22,7 +23,8 @@ pub fn import_roi(job: &SceneJob, region: &Path, path: &Path, progress: &Progres
     let mut archive = interface_archive(&loaded, &no_cameras(&loaded), &[]);
     archive.obb = Some(obb);
     write_interface(path, &archive)?;
-    progress.event(Event::SceneSaved { path: path.to_owned(), elapsed: start.elapsed() });
+    let scene = summary(&archive, true);
+    progress.event(Event::SceneSaved { path: path.to_owned(), scene, elapsed: start.elapsed() });
     Ok(())
 }
 
@@ -34,7 +36,7 @@ pub fn export_roi(job: &SceneJob, path: &Path, progress: &Progress) -> Result<bo
     let loaded = load(job, progress)?;
     let Some(obb) = interface_archive(&loaded, &no_cameras(&loaded), &[]).obb else { return Ok(false) };
     let mut file = AtomicFile::create(path)?;
-    roi::write(&mut file, &obb).map_err(|e| Error::format(path, e))?;
+    roi::write(&mut file, &obb).map_err(|e| Error::writing(path, e))?;
     file.commit()?;
     Ok(true)
 }
@@ -53,7 +55,7 @@ pub fn export_neighbors(job: &SceneJob, path: &Path, progress: &Progress) -> Res
     let lists: Vec<Vec<u32>> =
         views.iter().map(|view| view.neighbors.iter().map(|n| n.view.0).collect()).collect();
     let mut file = AtomicFile::create(path)?;
-    neighbors_file::write(&mut file, lists.iter().map(Vec::as_slice)).map_err(|e| Error::format(path, e))?;
+    neighbors_file::write(&mut file, lists.iter().map(Vec::as_slice)).map_err(|e| Error::writing(path, e))?;
     file.commit()
 }
 

@@ -5,35 +5,45 @@ use super::prepare::Prepared;
 use super::skip::Labels;
 use crate::error::{Error, Result};
 use crate::fusion::FusionSummary;
-use crate::progress::{Event, Progress};
+use crate::geometry::Camera;
+use crate::progress::{Event, Progress, SceneSummary};
 use crate::report::{ClassRow, OutputReport, fill_shares};
 use crate::scene::PointSource;
-use crate::semantics::ClassId;
+use crate::semantics::{ClassId, ClassPolicy, ClassTable};
 use crate::store::atomic::check_writable;
 use crate::store::cloud::{CloudOptions, WrittenClouds, check_cloud_paths, write_clouds};
-use crate::store::depth_store::DepthStore;
+use crate::store::depth_store::depth_map_name;
 use crate::store::export::{
     interface_archive, project_archive, relocate_names, write_interface, write_project,
 };
+use crate::store::import::LoadedScene;
+use crate::store::paths::is_same_file;
+use semvs_formats::mvs;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Checks that everything can be written, creating missing folders.
 ///
 /// # Errors
-/// The first place that cannot; options about labels without labels.
-pub(super) fn check_places(outputs: &Outputs, labels: Option<&Labels>) -> Result<()> {
-    let options = cloud_options(outputs, labels);
-    check_cloud_paths(&outputs.cloud, &options, labels.map(Labels::policy))?;
-    [&outputs.scene, &outputs.report].into_iter().flatten().try_for_each(|path| check_writable(path))?;
-    outputs.report.as_deref().map_or(Ok(()), |report| check_report(report, outputs))
+/// The first place that cannot; options about labels without classes.
+pub(super) fn check_places(outputs: &Outputs, classes: Option<(&ClassTable, &ClassPolicy)>) -> Result<()> {
+    let options = cloud_options(outputs, classes.map(|(table, _)| table));
+    check_cloud_paths(&outputs.cloud, &options, classes.map(|(_, policy)| policy))?;
+    [&outputs.scene, &outputs.report].into_iter().flatten().try_for_each(|path| check_writable(path))
 }
 
-/// Refuses a report in the place of another output, or of a file that is no report: a mistyped name must not cost a
-/// photograph.
-fn check_report(report: &Path, outputs: &Outputs) -> Result<()> {
+/// Refuses a report in the place of an input or another output, or of a file that is no report: a mistyped name must
+/// not cost a photograph.
+///
+/// # Errors
+/// [`Error::Content`] about the report.
+pub(super) fn check_report(outputs: &Outputs, inputs: &[PathBuf]) -> Result<()> {
+    let Some(report) = outputs.report.as_deref() else { return Ok(()) };
+    if inputs.iter().any(|input| is_same_file(input, report)) {
+        return Err(Error::content(report, "--report: this run reads that file; choose another name"));
+    }
     if report == outputs.cloud || Some(report) == outputs.scene.as_deref() {
         return Err(Error::content(
             report,
@@ -51,18 +61,23 @@ fn check_report(report: &Path, outputs: &Outputs) -> Result<()> {
     Ok(())
 }
 
-/// Checks that depth maps can be written, creating the folder.
+/// Checks that depth maps of the views with a camera can be written to `folder`, creating it.
 ///
 /// # Errors
 /// They cannot.
-pub(super) fn check_depth_maps(prepared: &Prepared, store: &DepthStore) -> Result<()> {
-    prepared.views().try_for_each(|view| check_writable(&store.path(prepared.id(view))))
+pub(super) fn check_depth_maps(
+    loaded: &LoadedScene,
+    cameras: &[Option<Camera>],
+    folder: &Path,
+) -> Result<()> {
+    let views = loaded.scene.views.iter().zip(cameras).filter(|(_, camera)| camera.is_some());
+    views.map(|(view, _)| folder.join(depth_map_name(view.id))).try_for_each(|path| check_writable(&path))
 }
 
-fn cloud_options<'a>(outputs: &Outputs, labels: Option<&'a Labels>) -> CloudOptions<'a> {
+fn cloud_options<'a>(outputs: &Outputs, table: Option<&'a ClassTable>) -> CloudOptions<'a> {
     CloudOptions {
         layout: outputs.layout,
-        table: labels.map(Labels::table),
+        table,
         split_by_class: outputs.split_by_class,
         color_by_label: outputs.color_by_label,
     }
@@ -79,7 +94,8 @@ pub(super) fn write_cloud(
     progress: &Progress,
 ) -> Result<WrittenClouds> {
     let start = Instant::now();
-    let written = write_clouds(cloud, &outputs.cloud, &cloud_options(outputs, labels), progress)?;
+    let written =
+        write_clouds(cloud, &outputs.cloud, &cloud_options(outputs, labels.map(Labels::table)), progress)?;
     for file in &written.files {
         progress.event(Event::CloudSaved {
             path: file.path.clone(),
@@ -115,8 +131,19 @@ pub(super) fn write_scene(
         SceneArchive::Interface => write_interface(path, &archive)?,
         SceneArchive::Project(kind) => write_project(path, &archive, kind)?,
     }
-    progress.event(Event::SceneSaved { path: path.clone(), elapsed: start.elapsed() });
+    let scene = summary(&archive, outputs.archive == SceneArchive::Interface);
+    progress.event(Event::SceneSaved { path: path.clone(), scene, elapsed: start.elapsed() });
     Ok(())
+}
+
+/// What a written scene holds.
+pub(super) fn summary(archive: &mvs::Scene, interface: bool) -> SceneSummary {
+    SceneSummary {
+        interface,
+        images: archive.images.len(),
+        calibrated: archive.images.iter().filter(|image| image.pose != mvs::NO_ID).count(),
+        points: archive.points.positions.len(),
+    }
 }
 
 /// The rows of a report about written clouds.

@@ -7,10 +7,12 @@ use super::sparse::{override_from_file, replace_points};
 use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
-use crate::progress::{Event, Progress};
+use crate::progress::{Event, Progress, SceneSummary};
 use crate::scene::{ImageId, ViewIndex, ViewNeighbors, estimate_roi, looks_like_tower, select_neighbors};
 use crate::store::import::{LoadedScene, load_scene};
 use semvs_formats::Limits;
+use semvs_formats::mvs::Container;
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// A scene that is ready for depth maps.
@@ -70,9 +72,12 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     }
     let scene = &mut loaded.scene;
     progress.event(Event::SceneLoaded {
-        images: scene.views.len(),
-        calibrated: scene.views.iter().filter(|v| v.calibration.is_some()).count(),
-        points: scene.tracks.len(),
+        scene: SceneSummary {
+            interface: matches!(loaded.container, Container::Interface { .. }),
+            images: scene.views.len(),
+            calibrated: scene.views.iter().filter(|v| v.calibration.is_some()).count(),
+            points: scene.tracks.len(),
+        },
         elapsed: start.elapsed(),
     });
     if scene.roi.is_none() {
@@ -90,7 +95,7 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     Ok(loaded)
 }
 
-/// Decodes the images, checks labels, and finds neighbours. `cameras` come from the images' headers; images whose
+/// Checks masks and labels, decodes the images, and finds neighbours. `cameras` come from the images' headers; images whose
 /// pixels turn out to be unusable are left out too, unless the job is strict.
 ///
 /// # Errors
@@ -103,6 +108,9 @@ pub(super) fn prepare(
     progress: &Progress,
 ) -> Result<Prepared> {
     let start = Instant::now();
+    // What is an error if it is wrong goes before the long work.
+    let masks = job.masks.as_ref().map(|m| Masks::find(m, &loaded, &cameras, progress)).transpose()?;
+    let labels = job.labels.as_ref().map(|l| Labels::open(l, &loaded, &cameras, progress)).transpose()?;
     let images = Images::new(&loaded, pixels_in_hand(job, &cameras) * size_of::<f32>());
     let mut dropped = header_drops(&loaded, &cameras);
     if decode {
@@ -124,8 +132,6 @@ pub(super) fn prepare(
         return Err(Error::content(&loaded.path, what));
     }
     progress.event(Event::ImagesPrepared { images: usable, elapsed: start.elapsed() });
-    let masks = job.masks.as_ref().map(|m| Masks::find(m, &loaded, &cameras, progress)).transpose()?;
-    let labels = job.labels.as_ref().map(|l| Labels::open(l, &loaded, &cameras, progress)).transpose()?;
     let neighbors = select_neighbors(&loaded.scene, &cameras, &job.neighbors)?;
     let prepared = Prepared { loaded, cameras, dropped, neighbors, images, masks, labels };
     report_pairs(&prepared, start, progress)?;
@@ -153,6 +159,34 @@ fn header_drops(loaded: &LoadedScene, cameras: &[Option<Camera>]) -> Vec<Option<
             _ => None,
         })
         .collect()
+}
+
+/// Names the views that get no depth map for lack of neighbours, and returns how many maps there will be, `existing`
+/// ones included.
+///
+/// # Errors
+/// With `strict`, the first such view.
+pub(super) fn name_unmatched(
+    prepared: &mut Prepared,
+    existing: &BTreeSet<ViewIndex>,
+    strict: bool,
+    progress: &Progress,
+) -> Result<usize> {
+    let has_map =
+        |v: &ViewIndex| existing.contains(v) || !prepared.neighbors[v.index()].matching().is_empty();
+    let (with, without): (Vec<ViewIndex>, Vec<ViewIndex>) = prepared.views().partition(has_map);
+    for &view in &without {
+        let what = format!(
+            "{}: no neighbour to be matched with: no image shares enough sparse points with it at a useful angle",
+            prepared.images.path(view).display()
+        );
+        if strict {
+            return Err(Error::invalid(what));
+        }
+        progress.warn(format!("{what}; view {} gets no depth map", view.0));
+        prepared.dropped[view.index()] = Some(what);
+    }
+    Ok(with.len())
 }
 
 fn report_pairs(prepared: &Prepared, start: Instant, progress: &Progress) -> Result<()> {

@@ -1,5 +1,6 @@
 //! `semvs inspect`.
 
+use crate::cli::one_line::printable;
 use crate::cli::semvs_args::InspectArgs;
 use crate::error::{Error, Result};
 use crate::pipeline;
@@ -54,7 +55,7 @@ fn inline(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
-        Value::String(text) => text.clone(),
+        Value::String(text) => printable(text),
         Value::Number(number) => match number.as_f64() {
             Some(v) if number.is_f64() => format!("{}", (v * 1e6).round() / 1e6),
             _ => number.to_string(),

@@ -3,7 +3,7 @@
 use super::args::{self, DropInArgs};
 use super::config_file;
 use super::tokens::{self, Typed};
-use crate::cli::commands::options_in_effect;
+use crate::cli::commands::effective::options_in_effect;
 use crate::cli::one_line::one_line;
 use crate::cli::values::{openmvs_path, under};
 use clap::{CommandFactory, FromArgMatches};
@@ -48,7 +48,7 @@ pub(crate) fn read(words: &[OsString]) -> Result<Typing, String> {
     let matches = DropInArgs::command().try_get_matches_from(canonical(&typed));
     let matches = matches.map_err(|error| one_line(&error))?;
     let args = DropInArgs::from_arg_matches(&matches).map_err(|error| one_line(&error))?;
-    let options = options_in_effect(&matches);
+    let options = options_in_effect::<DropInArgs>(&matches);
     Ok(Typing { args, given: typed.into_iter().map(|(name, _)| name).collect(), options })
 }
 
@@ -121,7 +121,6 @@ mod tests {
             (&["--crop-to-roi", "maybe"], "--crop-to-roi"),
             (&["--fusion-mode", "1.5"], "--fusion-mode"),
             (&["--label-consistency", "no"], "--label-consistency"),
-            (&["--classes", "a", "--exclude-classes", "b"], "--exclude-classes"),
         ] {
             let error = read_in(folder.path(), words).unwrap_err();
             assert!(error.contains(name) && !error.contains('\n'), "{error}");

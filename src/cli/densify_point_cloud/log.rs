@@ -1,9 +1,10 @@
 //! What `DensifyPointCloud` says: OpenMVS's lines, on stdout and in a log file.
 
-use crate::cli::duration::{self, Moment};
+use crate::cli::duration;
+use crate::cli::one_line::printable;
 use crate::cli::print;
 use crate::error::{Error, Result};
-use crate::progress::{Event, Listener, Stage};
+use crate::progress::{Event, Listener, SceneSummary, Stage};
 use std::fs::File;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -49,7 +50,7 @@ impl Log {
 
     /// What ended the run.
     pub(crate) fn error(&self, text: &str) {
-        self.important(&format!("error: {text}"));
+        self.important(&format!("error: {}", printable(text)));
     }
 
     fn important(&self, text: &str) {
@@ -67,7 +68,7 @@ impl Log {
 
 impl State {
     fn write(&mut self, text: &str, console: bool) {
-        let line = format!("{} [App     ] {text}\n", Moment::now().clock());
+        let line = format!("{} [App     ] {text}\n", duration::clock());
         if console {
             print(&line);
         }
@@ -86,7 +87,7 @@ fn file_name() -> PathBuf {
         .duration_since(std::time::UNIX_EPOCH)
         .map_or(0, |since| since.subsec_nanos());
     let unique = (std::process::id() ^ nanos) & 0xff_ffff;
-    PathBuf::from(format!("DensifyPointCloud-{}{unique:06X}.log", Moment::now().stamp()))
+    PathBuf::from(format!("DensifyPointCloud-{}{unique:06X}.log", duration::stamp()))
 }
 
 fn stage_name(stage: Stage) -> Option<&'static str> {
@@ -103,7 +104,7 @@ fn stage_name(stage: Stage) -> Option<&'static str> {
 impl Listener for Log {
     fn event(&self, event: &Event) {
         match event {
-            Event::Warning(text) => self.important(&format!("warning: {text}")),
+            Event::Warning(text) => self.important(&format!("warning: {}", printable(text))),
             _ => {
                 if let Some((level, text)) = message(event) {
                     self.line(level, &text);
@@ -145,16 +146,9 @@ fn running(name: &str, done: usize, total: usize, elapsed: Duration) -> String {
 fn message(event: &Event) -> Option<(i32, String)> {
     let time = |elapsed: &Duration| duration::text(*elapsed);
     Some(match event {
-        Event::Warning(text) | Event::Info(text) => (0, text.clone()),
-        Event::Detail(text) => (2, text.clone()),
-        Event::SceneLoaded { images, calibrated, points, elapsed } => (
-            0,
-            format!(
-                "Scene loaded from interface format ({}):\n\t{images} images ({calibrated} calibrated)\n\t\
-                 {points} points, 0 vertices, 0 faces",
-                time(elapsed)
-            ),
-        ),
+        Event::Warning(text) | Event::Info(text) => (0, printable(text)),
+        Event::Detail(text) => (2, printable(text)),
+        Event::SceneLoaded { scene, elapsed } => (0, scene_lines("loaded", "from", scene, elapsed, ":")),
         Event::ImagesPrepared { images, elapsed } => (
             0,
             format!(
@@ -207,10 +201,19 @@ fn message(event: &Event) -> Option<(i32, String)> {
         Event::CloudSaved { path, points, elapsed } => {
             (0, format!("Point-cloud '{}' saved: {points} points ({})", path.display(), time(elapsed)))
         }
-        Event::SceneSaved { elapsed, .. } => {
-            (0, format!("Scene saved to interface format ({})", time(elapsed)))
-        }
+        Event::SceneSaved { scene, elapsed, .. } => (0, scene_lines("saved", "to", scene, elapsed, "")),
     })
+}
+
+/// The lines about a scene that was read or written; project archives go without the name of a format.
+fn scene_lines(done: &str, to: &str, scene: &SceneSummary, elapsed: &Duration, end: &str) -> String {
+    let format = if scene.interface { format!(" {to} interface format") } else { String::new() };
+    let SceneSummary { images, calibrated, points, .. } = scene;
+    format!(
+        "Scene {done}{format} ({}){end}\n\t{images} images ({calibrated} calibrated)\n\t{points} points, 0 vertices, \
+         0 faces",
+        duration::text(*elapsed)
+    )
 }
 
 #[cfg(test)]

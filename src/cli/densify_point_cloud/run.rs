@@ -3,9 +3,10 @@
 use super::front::{self, Typing};
 use super::log::Log;
 use super::{actions, help, refusals};
-use crate::cli::commands::write_report;
-use crate::cli::duration::Moment;
+use crate::cli::commands::{effective, write_report};
+use crate::cli::duration;
 use crate::cli::listen::Recorder;
+use crate::cli::one_line::printable;
 use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::values::{openmvs_path, under, with_suffix};
@@ -55,9 +56,10 @@ pub fn densify_point_cloud(words: impl IntoIterator<Item = OsString>) -> ExitCod
 
 /// Says what went wrong.
 fn fail(log: Option<&Log>, error: &str) -> ExitCode {
+    let error = printable(error);
     match log {
-        Some(log) => log.error(error),
-        None => crate::cli::print(&format!("{} [App     ] error: {error}\n", Moment::now().clock())),
+        Some(log) => log.error(&error),
+        None => crate::cli::print(&format!("{} [App     ] error: {error}\n", duration::clock())),
     }
     if !std::io::stdout().is_terminal() {
         crate::cli::complain(&format!("error: {error}\n"));
@@ -71,7 +73,7 @@ fn run(typing: &Typing, folder: &Path, log: &Log, recorder: &Arc<Recorder>) -> R
         return Err(Error::invalid("no input file: give the scene, DensifyPointCloud SCENE.mvs; see --help"));
     };
     refusals::check(args).map_err(Error::Invalid)?;
-    let input = front::resolve(folder, input);
+    let input = existing_input(folder, input)?;
     let place = |path: &Path| front::resolve_existing(folder, path);
     let resolver = Resolver::new(&args.shared, &place)?;
     let progress = recorder.progress();
@@ -83,6 +85,26 @@ fn run(typing: &Typing, folder: &Path, log: &Log, recorder: &Arc<Recorder>) -> R
     let mut report = pipeline::densify(&job, resolve::cpu()?, &progress)?;
     report.warnings = recorder.warnings();
     conclude(report, &job, typing, log)
+}
+
+/// The scene as OpenMVS finds it.
+///
+/// # Errors
+/// There is none; the message says where it was looked for.
+fn existing_input(folder: &Path, typed: &Path) -> Result<PathBuf> {
+    let input = front::resolve(folder, typed);
+    if input.exists() {
+        return Ok(input);
+    }
+    let elsewhere = openmvs_path(typed);
+    let what = match std::path::absolute(&elsewhere) {
+        _ if folder.as_os_str().is_empty() || elsewhere.is_absolute() => "no such scene".to_owned(),
+        Ok(path) if path.exists() => {
+            format!("no such scene; its path is taken from the working folder (-w), give {}", path.display())
+        }
+        _ => "no such scene; its path is taken from the working folder (-w)".to_owned(),
+    };
+    Err(Error::content(&input, what))
 }
 
 fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) -> Result<DensifyJob> {
@@ -139,6 +161,8 @@ fn conclude(mut report: RunReport, job: &DensifyJob, typing: &Typing, log: &Log)
         report.program = "DensifyPointCloud".to_owned();
         report.version = env!("CARGO_PKG_VERSION").to_owned();
         report.options = typing.options.clone();
+        let (input, depth_maps) = (&job.input, &job.depth_maps);
+        effective::resolve(&mut report.options, input, &job.outputs, depth_maps, Some(&job.filter));
         write_report(&report, path)?;
     }
     Ok(())
