@@ -29,12 +29,14 @@ pub fn working_cameras(
         })
         .collect();
     let mut usable = Vec::with_capacity(cameras.len());
+    let mut first_problem = None;
     for (i, camera) in cameras.into_iter().enumerate() {
         usable.push(match camera {
             Some(Ok(camera)) => Some(camera),
             Some(Err(error)) if strict => return Err(error),
             Some(Err(error)) => {
                 warn!("{error}; view {i} is left out");
+                first_problem.get_or_insert(error.to_string());
                 None
             }
             None => None,
@@ -43,9 +45,9 @@ pub fn working_cameras(
     let count = usable.iter().flatten().count();
     if count < 2 {
         let what = format!(
-            "{count} of its {} images can be used: at least two with a pose and a readable file are needed; image \
-             names are relative to the working folder",
-            views.len()
+            "{count} of its {} images can be used: at least two with a pose and a readable file are needed{}",
+            views.len(),
+            first_problem.map(|problem| format!("; {problem}")).unwrap_or_default()
         );
         return Err(Error::content(&loaded.path, what));
     }
@@ -59,13 +61,38 @@ fn working_camera(
     resolution: &ResolutionOptions,
 ) -> Result<Camera> {
     let path = loaded.image_path(view);
+    if !path.exists() {
+        return Err(missing(loaded, view));
+    }
     let size = image_size(&path)?;
     if let Some(stated) = calibration.size.filter(|&stated| !same_shape(stated, size)) {
         let what =
             format!("{size} pixels, but the scene says {stated}: was it rotated, cropped or replaced?");
         return Err(Error::content(&path, what));
     }
-    Ok(calibration.camera_at(resolution.working_size(size)))
+    let working = resolution.working_size(size);
+    if working.width.min(working.height) < LEAST_SIDE {
+        let what = format!(
+            "its working size is {working} pixels, at least {LEAST_SIDE} each way are needed; use a lower \
+             --resolution-level or a higher --max-resolution"
+        );
+        return Err(Error::content(&path, what));
+    }
+    Ok(calibration.camera_at(working))
+}
+
+/// Fewer pixels than this do not hold the window by which images are matched.
+const LEAST_SIDE: u32 = 9;
+
+/// The photograph is in neither of the places where it may be.
+fn missing(loaded: &LoadedScene, view: ViewIndex) -> Error {
+    let [first, second] = loaded.search.places(&loaded.scene.views[view.index()].name);
+    if first == second {
+        return Error::content(&first, "no such image; names are relative to the working folder (-w)");
+    }
+    let what =
+        format!("no such image in the working folder (-w), nor beside the scene: {}", second.display());
+    Error::content(&first, what)
 }
 
 /// A photograph smaller than the scene says by more than this is another one, a thumbnail perhaps.

@@ -2,6 +2,7 @@
 
 use super::atomic::{AtomicFile, check_writable};
 use super::cloud_names::{class_paths, label_colors_path};
+use super::stale_clouds::stale_clouds;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::{CloudLayout, CloudPoint, PointSource};
@@ -129,7 +130,18 @@ pub fn write_clouds(
         write_pass(source, pass, options.table)?;
         files.extend(pass.iter().map(|job| job.file.clone()));
     }
+    warn_of_stale(path, &files, progress);
     Ok(WrittenClouds { files, classes })
+}
+
+/// Clouds by class of an earlier run stay, but do not belong to this one.
+fn warn_of_stale(path: &Path, files: &[WrittenCloud], progress: &Progress) {
+    let written: Vec<&Path> = files.iter().map(|file| file.path.as_path()).collect();
+    let stale: Vec<String> =
+        stale_clouds(path, &written).iter().map(|path| path.display().to_string()).collect();
+    if !stale.is_empty() {
+        progress.warn(format!("clouds of an earlier run, not of this one: {}", stale.join(", ")));
+    }
 }
 
 impl<'a> CloudOptions<'a> {
@@ -139,7 +151,7 @@ impl<'a> CloudOptions<'a> {
 
     fn needs_labels(&self) -> Error {
         let option = if self.split_by_class { "--split-by-class" } else { "--color-by-label" };
-        Error::invalid(format!("{option} needs labels; give --label-path, --class-table or both"))
+        Error::invalid(format!("{option} needs labels, which these points lack"))
     }
 }
 
@@ -249,7 +261,7 @@ impl<'a> Output<'a> {
     fn create(job: &'a Job) -> Result<Self> {
         let file = AtomicFile::create(&job.file.path)?;
         let writer = PlyWriter::new(file, &job.layout, job.file.points)
-            .map_err(|e| Error::format(&job.file.path, e))?;
+            .map_err(|e| Error::writing(&job.file.path, e))?;
         Ok(Output { job, writer, chunk: Cloud::default() })
     }
 
@@ -289,7 +301,7 @@ impl<'a> Output<'a> {
     }
 
     fn flush(&mut self) -> Result<()> {
-        self.writer.write(&self.chunk).map_err(|e| Error::format(&self.job.file.path, e))?;
+        self.writer.write(&self.chunk).map_err(|e| Error::writing(&self.job.file.path, e))?;
         self.chunk.clear();
         Ok(())
     }
@@ -297,7 +309,7 @@ impl<'a> Output<'a> {
     /// The complete file, not yet under its name.
     fn finish(mut self) -> Result<AtomicFile> {
         self.flush()?;
-        self.writer.finish().map_err(|e| Error::format(&self.job.file.path, e))
+        self.writer.finish().map_err(|e| Error::writing(&self.job.file.path, e))
     }
 }
 

@@ -246,7 +246,7 @@ pub fn read_depth_map(path: &Path, limits: Limits) -> Result<DepthEstimate> {
 pub fn write_depth_map(path: &Path, estimate: &DepthEstimate, image_name: &str) -> Result<()> {
     let file = file_from_estimate(estimate, image_name);
     let mut out = AtomicFile::create(path)?;
-    file.write(&mut out).map_err(|e| Error::format(path, e))?;
+    file.write(&mut out).map_err(|e| Error::writing(path, e))?;
     out.commit()
 }
 

@@ -134,7 +134,7 @@ pub fn relocate_names(archive: &mut mvs::Scene, from: &Path, to: &Path) {
 /// [`Error`] if the place cannot be written or the archive has an index out of range.
 pub fn write_project(path: &Path, archive: &mvs::Scene, kind: mvs::ArchiveKind) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
-    mvs::write_project(&mut file, archive, kind).map_err(|e| Error::format(path, e))?;
+    mvs::write_project(&mut file, archive, kind).map_err(|e| Error::writing(path, e))?;
     file.commit()
 }
 
@@ -144,7 +144,7 @@ pub fn write_project(path: &Path, archive: &mvs::Scene, kind: mvs::ArchiveKind) 
 /// [`Error`] if the place cannot be written or the archive has an index out of range.
 pub fn write_interface(path: &Path, archive: &mvs::Scene) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
-    mvs::write_interface(&mut file, archive, NEWEST_VERSION).map_err(|e| Error::format(path, e))?;
+    mvs::write_interface(&mut file, archive, NEWEST_VERSION).map_err(|e| Error::writing(path, e))?;
     file.commit()
 }
 

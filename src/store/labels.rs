@@ -3,6 +3,7 @@
 use super::byte_cache::ByteCache;
 use super::label_png::LabelReader;
 pub use super::label_png::UnknownLabel;
+use super::paths::is_same_file;
 use crate::error::{Error, Result};
 use crate::geometry::Size;
 use crate::progress::{Progress, Stage};
@@ -41,6 +42,22 @@ impl LabelSources {
     /// Whether labels take part at all.
     pub fn are_given(&self) -> bool {
         self.label_path.is_some() || self.class_table.is_some()
+    }
+
+    /// The class table, as far as it is known without label maps.
+    ///
+    /// # Errors
+    /// The folder of label maps is not there, the table cannot be used.
+    pub fn table(&self, limits: Limits) -> Result<ClassTable> {
+        self.check_folder()?;
+        Ok(class_table(self, limits)?.0)
+    }
+
+    fn check_folder(&self) -> Result<()> {
+        match self.label_path.as_deref().filter(|folder| !folder.is_dir()) {
+            Some(folder) => Err(Error::content(folder, "no such folder of label maps (--label-path)")),
+            None => Ok(()),
+        }
     }
 }
 
@@ -86,9 +103,7 @@ impl LabelStore {
         limits: Limits,
         progress: &Progress,
     ) -> Result<Self> {
-        if let Some(folder) = sources.label_path.as_deref().filter(|folder| !folder.is_dir()) {
-            return Err(Error::content(folder, "no such folder of label maps (--label-path)"));
-        }
+        sources.check_folder()?;
         let (table, table_is_assumed) = class_table(sources, limits)?;
         let colors = table.colors();
         let reader = LabelReader { table, colors, table_is_assumed, unknown: sources.unknown, limits };
@@ -260,10 +275,6 @@ fn warn_of_shared(views: &[LabelRequest], files: &HashMap<ViewIndex, PathBuf>, p
             progress.warn(format!("{}: label map of both {a} and {b}", path.display()));
         }
     }
-}
-
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Whether a label map of `size` has its image's aspect ratio: the larger of the two, scaled to the smaller one's

@@ -18,4 +18,5 @@ pub mod masks;
 pub mod packed;
 pub mod paths;
 pub mod spool;
+mod stale_clouds;
 pub mod stored_cloud;

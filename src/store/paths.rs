@@ -21,14 +21,20 @@ impl SearchPath {
     /// The file that `name` means: as it is if absolute, else in the working folder, else beside the scene. Where
     /// neither exists, the name in the working folder.
     pub fn find(&self, name: &str) -> PathBuf {
-        let name = clean_name(name);
-        let first = self.working_folder.join(&name);
-        if first.exists() {
-            return first;
-        }
-        let second = self.scene_folder.join(&name);
-        if second.exists() { second } else { first }
+        let [first, second] = self.places(name);
+        if !first.exists() && second.exists() { second } else { first }
     }
+
+    /// The places where the file that `name` means is looked for, in order; equal for an absolute name.
+    pub fn places(&self, name: &str) -> [PathBuf; 2] {
+        let name = clean_name(name);
+        [&self.working_folder, &self.scene_folder].map(|folder| folder.join(&name))
+    }
+}
+
+/// Whether two paths name one file.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// `name` with `/` separators, without `./`, and with `folder/..` collapsed.
