@@ -46,10 +46,19 @@ impl Error {
         Error::Io { path: path.to_owned(), action, source }
     }
 
-    /// An [`Error::Format`] about `path`; what the medium did wrong becomes an [`Error::Io`].
+    /// An [`Error::Format`] about `path`, which was read; what the medium did wrong becomes an [`Error::Io`].
     pub fn format(path: &Path, source: semvs_formats::Error) -> Self {
+        Error::of_file(path, "read", source)
+    }
+
+    /// An [`Error::Format`] about `path`, which was written; what the medium did wrong becomes an [`Error::Io`].
+    pub fn writing(path: &Path, source: semvs_formats::Error) -> Self {
+        Error::of_file(path, "write", source)
+    }
+
+    fn of_file(path: &Path, action: &'static str, source: semvs_formats::Error) -> Self {
         match source {
-            semvs_formats::Error::Io(source) => Error::io(path, "read or write", source),
+            semvs_formats::Error::Io(source) => Error::io(path, action, source),
             source => Error::Format { path: path.to_owned(), source },
         }
     }

@@ -243,7 +243,6 @@ fn clouds_cut_short_or_corrupt() {
     scratch.semvs("inspect cloud.ply").fails_naming(&["cloud.ply"]);
     let missing = scratch.semvs("evaluate none.ply --truth truth.ply --thresholds 0.1");
     missing.fails_naming(&["none.ply"]);
-    scratch.semvs("evaluate truth.ply --truth truth.ply --thresholds -1").fails_naming(&["-1"]);
 }
 
 #[test]
@@ -291,4 +290,164 @@ fn a_cloud_without_points_is_a_failure() {
 fn absurd_thread_counts_are_refused() {
     let scratch = Scratch::facade6();
     refused(&scratch, &format!("{SMALL} --max-threads 100000"), &["--max-threads 100000"]);
+}
+
+#[test]
+fn what_can_be_checked_is_checked_before_any_image_is_read() {
+    let scratch = Scratch::facade6();
+    scratch.write("file", "in the way");
+    for folder in ["out.building.ply", "out.labels.ply"] {
+        std::fs::create_dir(scratch.path(folder)).unwrap();
+    }
+    let labels = "--label-path labels --class-table 3dom-facade";
+    for (words, needle) in [
+        (format!("{labels} --exclude-classes skye"), "skye"),
+        (format!("{labels} --classes window --exclude-classes window"), "cancel out"),
+        ("--label-path labels --class-table nope".into(), "nope"),
+        ("--label-path nowhere --class-table ids".into(), "nowhere"),
+        (format!("{labels} --split-by-class"), "out.building.ply"),
+        (format!("{labels} --color-by-label"), "out.labels.ply"),
+        ("-w file".into(), "file"),
+        ("--ignore-mask-label 0 --mask-path nowhere".into(), "nowhere"),
+        ("--view-neighbors-file none.txt".into(), "none.txt"),
+        ("-p none.ply".into(), "none.ply"),
+        ("--sub-resolution-levels 30".into(), "--sub-resolution-levels 30"),
+    ] {
+        let out = scratch.semvs(&format!("densify scene.mvs -o out.ply {SMALL} {words}"));
+        let out = out.fails_naming(&[needle]);
+        assert!(!out.stderr.contains("Scene read"), "{}", out.stderr);
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_with_the_places_that_were_tried() {
+    let scratch = Scratch::facade6();
+    std::fs::remove_file(scratch.path("images/0005.jpg")).unwrap();
+    let places = ["out/images/0005.jpg", "the scene: images/0005.jpg"];
+    scratch.semvs(&format!("densify scene.mvs -w out -o x.ply --strict {SMALL}")).fails_naming(&places);
+    let here = scratch.path("scene.mvs").canonicalize().unwrap();
+    let needles = ["out/scene.mvs", "(-w)", here.to_str().unwrap()];
+    scratch.densify_point_cloud("scene.mvs -w out").fails_naming(&needles);
+    scratch.densify_point_cloud("none.mvs -w out").fails_naming(&["out/none.mvs", "(-w)"]);
+}
+
+#[test]
+fn views_without_neighbours_are_named_and_refused_when_strict() {
+    // No point is seen by image 1.
+    let scratch = changed(|scene| {
+        let mut views = mvs::Visibility::default();
+        for i in 0..scene.points.positions.len() {
+            let seen: Vec<u32> =
+                scene.points.views.images_of(i).iter().copied().filter(|&image| image != 1).collect();
+            views.push(&seen, &[]);
+        }
+        scene.points.views = views;
+    });
+    scratch.add_maps("post7", ".");
+    std::fs::remove_file(scratch.path("depth0001.dmap")).unwrap();
+    let densify = format!("densify scene.mvs -o x.ply --report run.json {FUSE_ONLY}");
+    let out = scratch.semvs(&densify).ok();
+    assert!(out.stderr.contains("0004.jpg: no neighbour"), "{}", out.stderr);
+    let report: serde_json::Value = serde_json::from_slice(&scratch.read("run.json")).unwrap();
+    assert!(report["views"][1]["dropped"].as_str().unwrap().contains("no neighbour"));
+    scratch.semvs(&format!("{densify} --strict")).fails_naming(&["0004.jpg", "no neighbour"]);
+}
+
+#[test]
+fn too_few_views_for_a_point_are_noticed_before_work() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps");
+    for map in 2..6 {
+        std::fs::remove_file(scratch.path(&format!("maps/depth000{map}.dmap"))).unwrap();
+    }
+    let fuse = "fuse scene.mvs --depth-maps maps -o x.ply --estimate-roi 0";
+    let out = scratch.semvs(fuse).fails_naming(&["no point", "--number-views-fuse 2"]);
+    assert!(!out.stderr.contains("Fused"), "{}", out.stderr);
+    // A scene of two usable images makes do with two.
+    for name in ["0005", "0006", "0012", "0013"] {
+        std::fs::remove_file(scratch.path(&format!("images/{name}.jpg"))).unwrap();
+    }
+    let out = scratch.semvs(fuse).ok();
+    assert!(out.stderr.contains("--number-views-fuse 3: only 2 images"), "{}", out.stderr);
+    assert!(scratch.has("x.ply"));
+    let tiny = format!("densify scene.mvs -o y.ply {FUSE_ONLY} --max-resolution 11");
+    scratch.semvs(&tiny).fails_naming(&["0 of its 6 images", "11×8", "--max-resolution"]);
+}
+
+#[test]
+fn what_a_scene_holds_beyond_use_is_said() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps");
+    scratch.edit("scene.mvs", |bytes| bytes.extend(b"tail"));
+    let fuse = "fuse scene.mvs --depth-maps maps -o x.ply --estimate-roi 0";
+    let out = scratch.semvs(fuse).ok();
+    assert!(out.stderr.contains("scene.mvs: 4 bytes after the end"), "{}", out.stderr);
+    // The region of interest ends the file.
+    scratch.edit("scene.mvs", |bytes| {
+        bytes.truncate(bytes.len() - 4);
+        let end = bytes.len();
+        bytes[end - 8..].copy_from_slice(&f64::NAN.to_le_bytes());
+    });
+    let out = scratch.semvs(fuse).ok();
+    assert!(out.stderr.contains("scene.mvs: its region of interest"), "{}", out.stderr);
+}
+
+#[test]
+fn a_report_never_replaces_a_class_table() {
+    let scratch = Scratch::facade6();
+    let table = r#"{"1": "building"}"#;
+    scratch.write("labels/labels.json", table);
+    scratch.write("classes.json", table);
+    let run = |words: &str| scratch.semvs(&format!("densify scene.mvs -o x.ply {SMALL} {words}"));
+    let named = "--label-path labels --class-table classes.json --report ./classes.json";
+    run(named).fails_naming(&["--report", "classes.json"]);
+    run("--label-path labels --report labels/labels.json").fails_naming(&["--report", "labels.json"]);
+    assert_eq!(scratch.read("labels/labels.json"), table.as_bytes());
+}
+
+#[test]
+fn clouds_go_to_files_only() {
+    let scratch = Scratch::facade6();
+    std::fs::create_dir(scratch.path("folder")).unwrap();
+    for output in ["new/", "folder", "folder/", "/"] {
+        scratch.semvs(&format!("densify scene.mvs {SMALL} -o {output}")).fails_naming(&["--output"]);
+    }
+    #[cfg(unix)]
+    scratch
+        .semvs(&format!("densify scene.mvs {SMALL} -o /dev/full"))
+        .fails_naming(&["/dev/full", "--output"]);
+    assert!(!scratch.has("new.ply") && !scratch.has("folder.ply"));
+}
+
+#[test]
+fn clouds_that_cannot_be_judged() {
+    let scratch = Scratch::new();
+    std::fs::copy(common::facade6().join("truth/truth.ply"), scratch.path("truth.ply")).unwrap();
+    let judge = |cloud: &str| scratch.semvs(&format!("evaluate {cloud} --truth truth.ply --thresholds 0.1"));
+    let empty =
+        "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n";
+    scratch.write("empty.ply", format!("{empty}end_header\n"));
+    judge("empty.ply").fails_naming(&["empty.ply", "no points"]);
+    std::fs::copy(common::facade6().join("images/0003.jpg"), scratch.path("image.ply")).unwrap();
+    judge("image.ply").fails_naming(&["image.ply", "no PLY file"]);
+    scratch.write("escape.ply", b"ply\nformat \x1b[2Jascii\x07 1.0\nend_header\n");
+    let out = judge("escape.ply").fails_naming(&["escape.ply", "u{1b}"]);
+    assert!(!out.stderr.contains(['\x1b', '\x07']), "{:?}", out.stderr);
+    let negative = scratch.semvs("evaluate truth.ply --truth truth.ply --thresholds 0.1 -1");
+    negative.fails_naming(&["threshold -1"]);
+}
+
+#[test]
+fn convert_refuses_what_it_cannot_mean() {
+    let scratch = Scratch::facade6();
+    scratch.add_maps("post7", "maps");
+    let convert = "convert maps/depth0000.dmap -o x.ply";
+    scratch
+        .semvs(&format!("{convert} maps/../maps/depth0000.dmap"))
+        .fails_naming(&["depth0000.dmap", "twice"]);
+    let labels = "--label-path labels --class-table 3dom-facade";
+    scratch
+        .semvs(&format!("{convert} {labels} --label-consistency strict"))
+        .fails_naming(&["--label-consistency"]);
+    assert!(!scratch.has("x.ply"));
 }

@@ -72,7 +72,6 @@ fn mistakes_on_the_command_line_are_one_line_and_exit_code_1() {
         ("densify", "SCENE.mvs"),
         ("densify s.mvs --nope", "--nope"),
         ("densify s.mvs --iters x", "--iters"),
-        ("densify s.mvs --classes a --exclude-classes b", "--exclude-classes"),
         ("dense s.mvs", "dense"),
         ("evaluate a.ply --thresholds 1", "--truth"),
         ("densify s.mvs -o cloud.las", ".ply"),
@@ -204,7 +203,9 @@ fn project_archives_hold_the_dense_cloud_as_openmvs_stores_it() {
     let folder = common::facade6().join("openmvs-2.3.0");
     for (kind, reference) in [(0, "archive3"), (1, "archive3"), (2, "archive2"), (3, "archive3")] {
         let scratch = with_maps();
-        scratch.densify_point_cloud(&format!("scene.mvs --archive-type {kind} {FUSE_ONLY}")).ok();
+        let out = scratch.densify_point_cloud(&format!("scene.mvs --archive-type {kind} {FUSE_ONLY}")).ok();
+        let saved = out.stdout.lines().find(|line| line.contains("Scene saved")).unwrap();
+        assert!(!saved.contains("interface"), "{saved}");
         let limits = semvs_formats::Limits::default();
         let ours = SceneFile::read(scratch.path("scene_dense.mvs"), &limits).unwrap();
         let theirs = SceneFile::read(folder.join(reference).join("scene_dense.mvs"), &limits).unwrap();
@@ -301,6 +302,8 @@ fn lines_that_callers_look_for_are_printed_and_logged() {
         "Depth-maps fused and filtered: 6 depth-maps, 132021 depths, 24171 points (18%%) (",
         "Densifying point-cloud completed: 24171 points (",
         "Point-cloud 'scene_dense.ply' saved: 24171 points (",
+        "Scene loaded from interface format (",
+        "Scene saved to interface format (",
     ] {
         let found = |lines: &str| {
             lines
@@ -391,8 +394,8 @@ fn files_are_inspected_for_people_and_programs() {
     for (file, kind, needle) in [
         ("scene.mvs", "scene", "calibrated: 6"),
         ("depth0000.dmap", "depth-map", "size: 200 150"),
-        ("images/0003.jpg", "picture", "width: 400"),
-        ("labels/0003_l.png", "picture", "color 0 0 255"),
+        ("images/0003.jpg", "image", "width: 400"),
+        ("labels/0003_l.png", "label-map", "color 0 0 255"),
     ] {
         let text = scratch.semvs(&format!("inspect {file}")).ok().stdout;
         assert!(text.contains(needle), "{file}\n{text}");
@@ -400,6 +403,10 @@ fn files_are_inspected_for_people_and_programs() {
         let json: serde_json::Value = serde_json::from_str(&json).unwrap();
         assert_eq!(json["kind"], kind);
     }
+    let json = scratch.semvs("inspect scene.mvs --json").ok().stdout;
+    let places = ["kind", "file", "bytes", "archive", "version", "cameras", "images", "region_of_interest"];
+    let places = places.map(|key| json.find(&format!("\n  \"{key}\"")).unwrap());
+    assert!(places.is_sorted(), "{json}");
     let truth = common::facade6().join("truth/truth.ply");
     let out = scratch.run(SEMVS, &[Path::new("inspect"), &truth]).ok();
     assert!(out.stdout.contains("encoding: binary little endian"), "{}", out.stdout);
@@ -416,4 +423,21 @@ fn a_cloud_against_itself_is_perfect() {
     let json: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
     assert_eq!(json["scores"][0]["f1"], 1.0);
     assert_eq!(json["labels"]["accuracy"], 1.0);
+}
+
+#[cfg(unix)]
+#[test]
+fn lines_tell_the_local_time() {
+    let scratch = Scratch::new();
+    // Nine and a half hours ahead of UTC.
+    let words = std::process::Command::new(DENSIFY)
+        .current_dir(scratch.path("."))
+        .env("TZ", "XYZ-9:30")
+        .output()
+        .unwrap();
+    let line = String::from_utf8(words.stdout).unwrap();
+    let said: u64 = 60 * line[..2].parse::<u64>().unwrap() + line[3..5].parse::<u64>().unwrap();
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs() / 60;
+    let expected = now + 9 * 60 + 30;
+    assert!((expected + 24 * 60 - said) % (24 * 60) <= 2, "{line}");
 }

@@ -105,6 +105,31 @@ fn classes_are_kept_and_dropped_as_asked() {
     let building = json["classes"].as_array().unwrap().iter().find(|c| c["name"] == "building").unwrap();
     assert_eq!(building["points"], kept.labels.iter().filter(|&&l| l == 1).count());
 
+    let options = json["options"].as_object().unwrap();
+    assert!(options.keys().all(|name| !name.contains(char::is_uppercase)), "{options:?}");
+    for (name, value) in [
+        ("iters", serde_json::json!(3)),
+        ("output", serde_json::json!("kept.ply")),
+        ("working-folder", serde_json::json!(".")),
+        ("label-consistency", serde_json::json!("support")),
+        ("ply-layout", serde_json::json!("plain")),
+        ("split-by-class", serde_json::json!(true)),
+        ("roi-border", serde_json::json!(0.0)),
+        ("mask-path", serde_json::Value::Null),
+    ] {
+        assert_eq!(options[name], value, "{name}");
+    }
+    if cfg!(unix) {
+        assert!(json["cpu_seconds"].as_f64().unwrap() > 0.0);
+        assert!(json["stages"].as_array().unwrap().iter().all(|stage| stage["cpu_seconds"].is_f64()));
+    }
+
+    let out = run("-o kept.ply --classes building,sky,window --exclude-classes sky,window");
+    assert!(cloud(&scratch, "kept.ply").labels.iter().all(|&l| l == 1));
+    let stale = ["earlier run", "kept.building.ply", "kept.labels.ply", "kept.window.ply"];
+    assert!(stale.iter().all(|name| out.stderr.contains(name)), "{}", out.stderr);
+    assert!(scratch.has("kept.window.ply"));
+
     run("-o only.ply --classes window --label-consistency strict");
     assert!(cloud(&scratch, "only.ply").labels.iter().all(|&l| l == 4));
     // Each mode is stricter than the one before.

@@ -15,7 +15,7 @@ pub(crate) struct LabelInput {
     #[arg(long, value_name = "TABLE")]
     pub(crate) class_table: Option<String>,
     /// Keep only these classes: names or ids, separated by commas
-    #[arg(long, value_name = "A,B", value_delimiter = ',', conflicts_with = "exclude_classes")]
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
     pub(crate) classes: Vec<String>,
     /// Drop these classes: names or ids, separated by commas
     #[arg(long, value_name = "A,B", value_delimiter = ',')]

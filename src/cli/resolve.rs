@@ -250,12 +250,14 @@ pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Re
         (typed.label_border > 0, "--label-border"),
     ];
     match asked.iter().find(|(asked, _)| *asked) {
-        Some((_, option)) => {
-            Err(Error::invalid(format!("{option} needs labels: give --label-path, --class-table or both")))
-        }
+        Some((_, option)) => Err(Error::invalid(format!("{option} needs labels: {NEEDED}"))),
         None => Ok(None),
     }
 }
+
+/// How to give labels.
+const NEEDED: &str =
+    "give --label-path, the folder of the label maps, and --class-table unless they hold plain ids";
 
 /// A class table as typed: a file if there is one of that name, else the name of a built-in table.
 fn table(name: &str, place: &dyn Fn(&Path) -> PathBuf) -> String {

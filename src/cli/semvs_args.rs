@@ -136,7 +136,10 @@ Examples:
 
 /// Turn depth maps into a cloud, every depth a point, without fusion
 #[derive(Clone, Debug, Args)]
-#[command(after_help = CONVERT_EXAMPLES)]
+#[command(
+    after_help = CONVERT_EXAMPLES,
+    mut_args(|arg| if NOT_FOR_CONVERT.contains(&arg.get_id().as_str()) { arg.hide(true) } else { arg })
+)]
 pub(crate) struct ConvertArgs {
     /// Depth maps (.dmap)
     #[arg(value_name = "FILE.dmap", required = true)]
@@ -160,6 +163,9 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "LAYOUT", value_enum, default_value_t = PlyLayout::Plain)]
     pub(crate) ply_layout: PlyLayout,
 }
+
+/// Label options that say how labels restrict fusion; refused where nothing is fused.
+const NOT_FOR_CONVERT: &[&str] = &["label_consistency", "label_border"];
 
 const CONVERT_EXAMPLES: &str = "\
 Examples:
@@ -188,11 +194,18 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_name = "TRUTH.ply")]
     pub(crate) truth: PathBuf,
     /// Distances at which a point counts as right, in scene units
-    #[arg(long, value_name = "D", num_args = 1.., value_delimiter = ',', required = true)]
+    #[arg(
+        long,
+        value_name = "D",
+        num_args = 1..,
+        value_delimiter = ',',
+        required = true,
+        allow_negative_numbers = true
+    )]
     pub(crate) thresholds: Vec<f64>,
     /// Both clouds are thinned to one point per cube of this edge; 0 = not at all [default: half the smallest
     /// threshold]
-    #[arg(long, value_name = "EDGE")]
+    #[arg(long, value_name = "EDGE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
     /// Ids of the true classes that count: a point on any other class is wrong
     #[arg(long, value_name = "ID", num_args = 1.., value_delimiter = ',')]

@@ -1,5 +1,6 @@
 //! Depth maps to a cloud without fusion.
 
+use super::inputs::Classes;
 use super::job::{LabelJob, Outputs};
 use super::outputs::{check_places, cloud_rows, write_cloud};
 use super::skip::Labels;
@@ -15,6 +16,7 @@ use crate::store::labels::LabelRequest;
 use crate::store::paths::SearchPath;
 use crate::store::spool::{DEFAULT_SPOOL_MEMORY, PointSpool};
 use semvs_formats::Limits;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -38,10 +40,12 @@ pub struct ConvertJob {
 /// An unreadable file, or an output that cannot be written.
 pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
     job.outputs.check_labels(job.labels.is_some())?;
-    check_places(&job.outputs.without_labels(), None)?;
+    let classes = job.labels.as_ref().map(Classes::of).transpose()?;
+    check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
+    check_once_each(&job.depth_maps)?;
     let maps = job.depth_maps.iter().map(|path| Source::new(path, job)).collect::<Result<Vec<Source>>>()?;
     let labels = job.labels.as_ref().map(|labels| open_labels(labels, &maps, progress)).transpose()?;
-    check_places(&job.outputs, labels.as_ref())?;
+    check_places(&job.outputs, labels.as_ref().map(Labels::classes))?;
     for map in maps.iter().filter(|map| map.color.is_none()) {
         let image = map.image.display();
         progress.warn(format!("{image}: no such image; the cloud gets no colours"));
@@ -66,6 +70,17 @@ pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
     let written = write_cloud(&job.outputs, &cloud, labels.as_ref(), progress)?;
     let outputs: Vec<OutputReport> = cloud_rows(&written, labels.as_ref());
     Ok(RunReport { points: cloud.len(), outputs, ..RunReport::default() })
+}
+
+/// Refuses a depth map that is given twice: its points would be there twice.
+fn check_once_each(maps: &[PathBuf]) -> Result<()> {
+    let mut seen = HashSet::new();
+    let repeated =
+        maps.iter().find(|path| !seen.insert(path.canonicalize().unwrap_or_else(|_| path.to_path_buf())));
+    match repeated {
+        Some(path) => Err(Error::content(path, "this depth map is given twice")),
+        None => Ok(()),
+    }
 }
 
 /// A depth map and its image.

@@ -2,11 +2,15 @@
 
 use super::estimate::{Estimation, existing_maps};
 use super::filter::filter_across_views;
-use super::fusing::{Fused, fuse_maps};
+use super::fusing::{Fused, fuse_maps, possible};
+use super::inputs::{Classes, check_inputs, named_files};
 use super::job::{DensifyJob, SceneJob};
-use super::outputs::{check_depth_maps, check_places, class_rows, cloud_rows, write_cloud, write_scene};
-use super::prepare::{Prepared, load, pixels_in_hand, prepare};
+use super::outputs::{
+    check_depth_maps, check_places, check_report, class_rows, cloud_rows, write_cloud, write_scene,
+};
+use super::prepare::{Prepared, load, name_unmatched, pixels_in_hand, prepare};
 use super::record::{Clock, view_rows, with_threads};
+use super::skip::Labels;
 use super::sparse::SparseCloud;
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions, WithNormals};
@@ -14,6 +18,7 @@ use crate::progress::{Event, Progress};
 use crate::report::{OutputReport, RunReport};
 use crate::scene::{PointSource, ViewIndex};
 use crate::stereo::CpuLevel;
+use crate::store::atomic::create_folder;
 use crate::store::cameras::working_cameras;
 use crate::store::depth_store::DepthStore;
 use nalgebra::Vector3;
@@ -39,18 +44,26 @@ pub fn densify(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<R
 fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport> {
     let mut clock = Clock::start();
     job.check()?;
-    check_places(&job.outputs.without_labels(), None)?;
+    let classes = check_inputs(&job.input)?;
+    check_report(&job.outputs, &named_files(&job.input))?;
+    check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
+    create_folder(&job.depth_maps)?;
     let loaded = load(&job.input, progress)?;
     let cameras = working_cameras(&loaded, &job.resolution, job.input.strict)?;
+    check_depth_maps(&loaded, &cameras, &job.depth_maps)?;
     clock.stage("load");
-    let prepared = prepare(&job.input, loaded, cameras, true, progress)?;
-    check_places(&job.outputs, prepared.labels.as_ref())?;
+    let mut prepared = prepare(&job.input, loaded, cameras, true, progress)?;
+    check_places(&job.outputs, prepared.labels.as_ref().map(Labels::classes))?;
     let store = caching_store(&job.input, &prepared, &job.depth_maps);
-    check_depth_maps(&prepared, &store)?;
     clock.stage("prepare");
 
     let use_existing = job.stereo.geometric_iterations == 0;
     let existing = existing_maps(&prepared, &store, use_existing, job.input.strict, progress)?;
+    let maps = name_unmatched(&mut prepared, &existing, job.input.strict, progress)?;
+    let fusion = match job.depth_maps_only {
+        true => job.fusion,
+        false => possible(&job.fusion, prepared.count(), maps, progress)?,
+    };
     let estimation = Estimation {
         prepared: &prepared,
         store: &store,
@@ -70,7 +83,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     if job.depth_maps_only {
         finish_depth_maps(job, &prepared, &mapped, &clock, progress, &mut report)?;
     } else {
-        finish_cloud(job, &prepared, &store, &mapped, &mut clock, progress, &mut report)?;
+        finish_cloud(job, &fusion, &prepared, &store, &mapped, &mut clock, progress, &mut report)?;
     }
     report.views = view_rows(&prepared, &store, &mapped, &existing)?;
     depth_map_rows(&prepared, &store, &mapped, &mut report);
@@ -129,8 +142,10 @@ fn finish_depth_maps(
     Ok(())
 }
 
+#[allow(clippy::too_many_arguments, reason = "what a run has at its end")]
 fn finish_cloud(
     job: &DensifyJob,
+    fusion: &FusionOptions,
     prepared: &Prepared,
     store: &DepthStore,
     mapped: &[ViewIndex],
@@ -139,10 +154,10 @@ fn finish_cloud(
     report: &mut RunReport,
 ) -> Result<()> {
     let folder = job.outputs.folder();
-    let fused = fuse_maps(prepared, store, mapped, &job.fusion, &job.input.roi, folder, progress)?;
+    let fused = fuse_maps(prepared, store, mapped, fusion, &job.input.roi, folder, progress)?;
     clock.stage("fuse");
     progress.event(Event::Densified { points: fused.cloud.len(), elapsed: clock.elapsed() });
-    write_results(&job.outputs, prepared, &fused, &job.fusion, progress, report)
+    write_results(&job.outputs, prepared, &fused, fusion, progress, report)
 }
 
 /// Writes cloud and scene, and enters them in the report.
@@ -156,9 +171,9 @@ pub(super) fn write_results(
 ) -> Result<()> {
     if fused.cloud.is_empty() {
         return Err(Error::invalid(format!(
-            "no point is seen alike by {} views, and nothing is written: are the images and poses right? \
-             --number-views-fuse 2 asks for less",
-            options.number_views_fuse
+            "no point is seen alike by {} views, and nothing is written: are the images and poses right?{}",
+            options.number_views_fuse,
+            if options.number_views_fuse > 2 { " --number-views-fuse 2 asks for less" } else { "" }
         )));
     }
     let labels = prepared.labels.as_ref();

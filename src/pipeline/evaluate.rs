@@ -25,12 +25,19 @@ pub fn evaluate(job: &EvaluateJob) -> Result<CloudScores> {
     job.options.check()?;
     let truth = read_points(&job.truth)?;
     let cloud = read_points(&job.cloud)?;
-    cloud_scores(&cloud, &truth, &job.options)
+    let scores = cloud_scores(&cloud, &truth, &job.options)?;
+    if scores.points == 0 {
+        return Err(Error::content(&job.cloud, "the cloud has no points to judge"));
+    }
+    Ok(scores)
 }
 
 fn read_points(path: &Path) -> Result<LabelledPoints> {
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
     let cloud = ply::read_cloud(file, &Limits::default()).map_err(|e| Error::format(path, e))?;
+    if cloud.is_empty() {
+        return Err(Error::content(path, "the cloud has no points"));
+    }
     let positions = match cloud.positions_f64.is_empty() {
         true => cloud.positions.iter().map(|p| p.map(f64::from)).collect(),
         false => cloud.positions_f64,

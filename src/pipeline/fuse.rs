@@ -1,11 +1,13 @@
 //! Depth maps that exist to a cloud.
 
 use super::densify::write_results;
-use super::fusing::fuse_maps;
+use super::fusing::{fuse_maps, possible};
+use super::inputs::{Classes, check_inputs, named_files};
 use super::job::{DepthMapsJob, FuseJob};
-use super::outputs::check_places;
+use super::outputs::{check_places, check_report};
 use super::prepare::{load, prepare};
 use super::record::{Clock, view_rows, with_threads};
+use super::skip::Labels;
 use crate::error::{Error, Result};
 use crate::fusion::AttributeSource;
 use crate::geometry::{Camera, Size};
@@ -35,7 +37,9 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     {
         return Err(Error::content(folder, "no such folder of depth maps (--depth-maps)"));
     }
-    check_places(&job.outputs.without_labels(), None)?;
+    let classes = check_inputs(&job.input)?;
+    check_report(&job.outputs, &named_files(&job.input))?;
+    check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
     let loaded = load(&job.input, progress)?;
     let store = open_maps(&job.depth_maps, &loaded)?;
     let cameras = match &job.resolution {
@@ -48,15 +52,16 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let prepared = prepare(&job.input, loaded, cameras, decode, progress)?;
     let mapped: Vec<ViewIndex> =
         mapped.into_iter().filter(|v| prepared.cameras[v.index()].is_some()).collect();
-    check_places(&job.outputs, prepared.labels.as_ref())?;
+    check_places(&job.outputs, prepared.labels.as_ref().map(Labels::classes))?;
+    let fusion = possible(&job.fusion, prepared.count(), mapped.len(), progress)?;
     clock.stage("prepare");
 
     let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
     let folder = job.outputs.folder();
-    let fused = fuse_maps(&prepared, &store, &mapped, &job.fusion, &job.input.roi, folder, progress)?;
+    let fused = fuse_maps(&prepared, &store, &mapped, &fusion, &job.input.roi, folder, progress)?;
     clock.stage("fuse");
     progress.event(Event::Densified { points: fused.cloud.len(), elapsed: clock.elapsed() });
-    write_results(&job.outputs, &prepared, &fused, &job.fusion, progress, &mut report)?;
+    write_results(&job.outputs, &prepared, &fused, &fusion, progress, &mut report)?;
     let reused: BTreeSet<ViewIndex> = mapped.iter().copied().collect();
     report.views = view_rows(&prepared, &store, &mapped, &reused)?;
     clock.stage("write");

@@ -23,6 +23,40 @@ pub(super) struct Fused {
     pub(super) summary: FusionSummary,
 }
 
+/// `options` for a scene of `usable` images, of which `maps` have a depth map: like OpenMVS, a scene with fewer images
+/// than must agree on a point makes do with what it has.
+///
+/// # Errors
+/// So few depth maps that no point can come about.
+pub(super) fn possible(
+    options: &FusionOptions,
+    usable: usize,
+    maps: usize,
+    progress: &Progress,
+) -> Result<FusionOptions> {
+    let asked = options.number_views_fuse;
+    if asked < 2 {
+        return Ok(*options);
+    }
+    let fewest = asked.min(u32::try_from(usable.max(2)).unwrap_or(u32::MAX));
+    if maps < fewest as usize {
+        let remedy = match maps {
+            0 | 1 => "--number-views-fuse 1 makes a point of every depth".to_owned(),
+            maps => format!("give --number-views-fuse {maps}"),
+        };
+        return Err(Error::invalid(format!(
+            "no point is possible: {fewest} images must agree on one (--number-views-fuse), and {maps} of {usable} have \
+             a depth map or can get one; {remedy}"
+        )));
+    }
+    if fewest < asked {
+        progress.warn(format!(
+            "--number-views-fuse {asked}: only {usable} images can be used; {fewest} must agree"
+        ));
+    }
+    Ok(FusionOptions { number_views_fuse: fewest, ..*options })
+}
+
 /// Fuses the maps of `views`. Points beyond memory wait in `folder`.
 ///
 /// # Errors

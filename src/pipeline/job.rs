@@ -207,7 +207,8 @@ impl Outputs {
         let asked = [(self.split_by_class, "--split-by-class"), (self.color_by_label, "--color-by-label")];
         match asked.iter().find(|(asked, _)| *asked && !has_labels) {
             Some((_, option)) => Err(Error::invalid(format!(
-                "{option} needs labels: give --label-path, --class-table or both"
+                "{option} needs labels: give --label-path, the folder of the label maps, and --class-table unless they \
+                 hold plain ids"
             ))),
             None => Ok(()),
         }

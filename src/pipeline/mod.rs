@@ -11,6 +11,7 @@ mod finished;
 mod fuse;
 mod fusing;
 mod images;
+mod inputs;
 pub mod inspect;
 mod job;
 mod outputs;

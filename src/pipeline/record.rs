@@ -14,6 +14,8 @@ use std::time::Instant;
 pub(super) struct Clock {
     start: Instant,
     stage: Instant,
+    cpu_start: Option<f64>,
+    cpu_stage: Option<f64>,
     stages: Vec<StageTime>,
 }
 
@@ -21,15 +23,18 @@ impl Clock {
     /// Starts now.
     pub(super) fn start() -> Self {
         let now = Instant::now();
-        Clock { start: now, stage: now, stages: Vec::new() }
+        let cpu = cpu_seconds();
+        Clock { start: now, stage: now, cpu_start: cpu, cpu_stage: cpu, stages: Vec::new() }
     }
 
     /// The stage that ends now.
     pub(super) fn stage(&mut self, name: &str) {
         let now = Instant::now();
         let seconds = (now - self.stage).as_secs_f64();
-        self.stages.push(StageTime { stage: name.to_owned(), seconds, cpu_seconds: None });
-        self.stage = now;
+        let cpu = cpu_seconds();
+        let spent = difference(cpu, self.cpu_stage);
+        self.stages.push(StageTime { stage: name.to_owned(), seconds, cpu_seconds: spent });
+        (self.stage, self.cpu_stage) = (now, cpu);
     }
 
     /// Time since the start.
@@ -40,8 +45,24 @@ impl Clock {
     /// Puts the times into a report.
     pub(super) fn finish(self, report: &mut RunReport) {
         report.seconds = self.start.elapsed().as_secs_f64();
+        report.cpu_seconds = difference(cpu_seconds(), self.cpu_start);
         report.stages = self.stages;
     }
+}
+
+/// Time that all threads of this process have worked so far, seconds; `None` where the system does not tell.
+fn cpu_seconds() -> Option<f64> {
+    #[cfg(unix)]
+    {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
+    }
+    #[cfg(not(unix))]
+    None
+}
+
+fn difference(later: Option<f64>, earlier: Option<f64>) -> Option<f64> {
+    Some(later? - earlier?)
 }
 
 /// One row per view of the scene; `mapped` ones have depth maps, of which `reused` were there before.

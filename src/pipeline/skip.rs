@@ -66,6 +66,11 @@ impl Labels {
         self.store.table()
     }
 
+    /// The classes, and what to do with each.
+    pub(super) fn classes(&self) -> (&ClassTable, &ClassPolicy) {
+        (self.table(), self.policy())
+    }
+
     /// What to do with each class.
     pub(super) fn policy(&self) -> &ClassPolicy {
         &self.policy

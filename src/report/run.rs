@@ -19,6 +19,8 @@ pub struct RunReport {
     pub stages: Vec<StageTime>,
     /// Wall time of the whole run, seconds.
     pub seconds: f64,
+    /// Time of all threads together, seconds; `None` = not measured.
+    pub cpu_seconds: Option<f64>,
     /// Views of the scene in order.
     pub views: Vec<ViewReport>,
     /// Points of the dense cloud.
@@ -129,6 +131,7 @@ mod tests {
             options: [("number-views-fuse".to_owned(), serde_json::json!(2))].into_iter().collect(),
             stages: vec![StageTime { stage: "fusion".into(), seconds: 1.25, cpu_seconds: None }],
             seconds: 12.0,
+            cpu_seconds: Some(20.0),
             views: vec![ViewReport { id: 12, depth_range: [1.0, f32::INFINITY], ..ViewReport::default() }],
             points: 12_345,
             classes: vec![ClassRow {

@@ -45,15 +45,15 @@ impl StereoOptions {
     /// [`Error::Invalid`] names the option, its value and the allowed range.
     pub fn check(&self) -> Result<()> {
         let whole = [
-            ("levels", self.levels, 0, 8),
-            ("iterations", self.iterations, 1, 100),
-            ("geometric iterations", self.geometric_iterations, 0, 100),
+            ("--sub-resolution-levels", self.levels, 0, 8),
+            ("--iters", self.iterations, 1, 100),
+            ("--geometric-iters", self.geometric_iterations, 0, 100),
             ("candidates", self.candidates, 1, 64),
             ("refine views", self.refine_views, 1, 64),
         ];
         for (name, value, low, high) in whole {
             if !(low..=high).contains(&value) {
-                return Err(Error::invalid(format!("{name} is {value}; it must be {low} to {high}")));
+                return Err(Error::invalid(format!("{name} {value}: give {low} to {high}")));
             }
         }
         if !(self.keep_cost > 0.0 && self.keep_cost <= 2.0) {

@@ -200,5 +200,5 @@ fn unusable_problems_are_named() {
     wrong.sources[1].camera = wrong.sources[1].camera.scaled_per_axis(Size::new(56, 40));
     assert!(message(wrong).contains("image 0002 is 112×80, its camera is for 56×40"));
     let bad = StereoOptions { iterations: 0, ..options };
-    assert!(bad.check().unwrap_err().to_string().contains("iterations is 0"));
+    assert!(bad.check().unwrap_err().to_string().contains("--iters 0"));
 }

@@ -48,22 +48,22 @@ impl LoadedScene {
 /// are calibrated.
 pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result<LoadedScene> {
     let workspace = path.is_dir().then(|| Workspace::at(path, None)).transpose()?;
-    let (mut archive, container, search) = match &workspace {
+    let (mut archive, container, search, trailing_bytes) = match &workspace {
         Some(workspace) => {
             let container = mvs::Container::Interface { version: mvs::NEWEST_VERSION };
             let search = SearchPath { working_folder: path.to_owned(), scene_folder: path.to_owned() };
-            (workspace.read_scene(limits)?, container, search)
+            (workspace.read_scene(limits)?, container, search, 0)
         }
         None => {
             let file = SceneFile::read(path, limits).map_err(|e| Error::format(path, e))?;
-            (file.scene, file.container, SearchPath::new(working_folder, path))
+            (file.scene, file.container, SearchPath::new(working_folder, path), file.trailing_bytes)
         }
     };
     // Before repair merges them: a view that observed a point twice counts twice in view selection.
     let tracks = import_tracks(&archive);
     let repairs = archive.repair().map_err(|e| Error::format(path, e))?;
     warn_of_repairs(path, &repairs);
-    warn_of_remains(path, &archive, file.trailing_bytes);
+    warn_of_remains(path, &archive, trailing_bytes);
     archive.check().map_err(|e| Error::format(path, e))?;
     let views = import_views(path, &archive, container, &search)?;
     let calibrated = views.iter().filter(|v| v.calibration.is_some()).count();

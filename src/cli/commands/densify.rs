@@ -1,21 +1,26 @@
 //! `semvs densify`.
 
-use super::{cloud_path, conclude, default_cloud, is_typed, outputs, own_folder, resolver, spare_workspace};
+use super::{
+    cloud_path, conclude, default_cloud, effective, is_typed, outputs, own_folder, resolver, spare_workspace,
+};
 use crate::cli::listen::Recorder;
 use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::DensifyArgs;
 use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob};
+use crate::store::paths::is_same_file;
 use clap::ArgMatches;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Runs the command.
 pub(crate) fn densify(args: &DensifyArgs, typed: &ArgMatches, recorder: &Arc<Recorder>) -> Result<()> {
     let job = job(args, typed, &resolver(&args.shared, recorder)?)?;
     let report = pipeline::densify(&job, resolve::cpu()?, &recorder.progress())?;
-    conclude(report, "semvs densify", typed, recorder, job.outputs.report.as_deref())
+    let mut options = effective::options_in_effect::<DensifyArgs>(typed);
+    effective::resolve(&mut options, &job.input, &job.outputs, None, Some(&job.filter));
+    conclude(report, "semvs densify", options, recorder, job.outputs.report.as_deref())
 }
 
 fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<DensifyJob> {
@@ -25,7 +30,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         None => default_cloud(&args.scene),
     };
     let scene = cloud.with_extension("mvs");
-    if same_file(&scene, &args.scene) {
+    if is_same_file(&scene, &args.scene) {
         let what =
             "--output: the scene written beside the cloud would replace the input; choose another name";
         return Err(Error::content(&cloud, what));
@@ -57,8 +62,4 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         fusion: resolver.fusion()?,
         outputs,
     })
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

@@ -1,6 +1,6 @@
 //! `semvs fuse`.
 
-use super::{cloud_path, conclude, default_cloud, is_typed, outputs, resolver, spare_workspace};
+use super::{cloud_path, conclude, default_cloud, effective, is_typed, outputs, resolver, spare_workspace};
 use crate::cli::listen::Recorder;
 use crate::cli::resolve::Resolver;
 use crate::cli::semvs_args::{ColmapPass, FuseArgs};
@@ -15,7 +15,13 @@ use std::sync::Arc;
 pub(crate) fn fuse(args: &FuseArgs, typed: &ArgMatches, recorder: &Arc<Recorder>) -> Result<()> {
     let job = job(args, typed, &resolver(&args.shared, recorder)?)?;
     let report = pipeline::fuse(&job, &recorder.progress())?;
-    conclude(report, "semvs fuse", typed, recorder, job.outputs.report.as_deref())
+    let mut options = effective::options_in_effect::<FuseArgs>(typed);
+    let folder = match &job.depth_maps {
+        DepthMapsJob::Folder(folder) => Some(folder.as_path()),
+        DepthMapsJob::Colmap(_) => None,
+    };
+    effective::resolve(&mut options, &job.input, &job.outputs, folder, None);
+    conclude(report, "semvs fuse", options, recorder, job.outputs.report.as_deref())
 }
 
 fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<FuseJob> {

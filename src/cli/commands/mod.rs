@@ -3,6 +3,7 @@
 mod compare;
 mod convert;
 mod densify;
+pub(crate) mod effective;
 mod evaluate;
 mod fuse;
 mod inspect;
@@ -31,9 +32,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The cloud that `-o` names: `.ply` is added to a name without extension.
+///
+/// # Errors
+/// It can only be a folder, is a device, or has the extension of another kind of file.
 fn cloud_path(typed: &Path) -> Result<PathBuf> {
+    let ends_in_separator = typed.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
     match typed.extension() {
         _ if typed.file_name().is_none() => Err(Error::content(typed, "--output: give a file name")),
+        _ if ends_in_separator || typed.is_dir() => {
+            Err(Error::content(typed, "--output: this is a folder; give the name of a file in it"))
+        }
+        _ if typed.exists() && !typed.is_file() => {
+            Err(Error::content(typed, "--output: this is a device or a pipe; give the name of a file"))
+        }
         None => Ok(typed.with_extension("ply")),
         Some(extension) if extension.eq_ignore_ascii_case("ply") => Ok(typed.to_owned()),
         Some(_) => Err(Error::content(typed, "--output: clouds are written as .ply; end the name so")),
@@ -74,17 +85,6 @@ fn is_typed(matches: &ArgMatches, long: &str) -> bool {
     matches.value_source(&long.replace('-', "_")) == Some(ValueSource::CommandLine)
 }
 
-/// Every option in effect, typed or by default, under its long name.
-pub(crate) fn options_in_effect(matches: &ArgMatches) -> Map<String, Value> {
-    let mut options = Map::new();
-    for id in matches.ids() {
-        let Ok(Some(values)) = matches.try_get_raw(id.as_str()) else { continue };
-        let values: Vec<String> = values.map(|v| v.to_string_lossy().into_owned()).collect();
-        options.insert(id.as_str().replace('_', "-"), Value::String(values.join(",")));
-    }
-    options
-}
-
 /// Options whose paths are relative to the current folder, with remarks about the dense config file as warnings.
 fn resolver<'a>(options: &'a SharedOptions, recorder: &Arc<Recorder>) -> Result<Resolver<'a>> {
     let resolver = Resolver::new(options, &Path::to_path_buf)?;
@@ -112,13 +112,13 @@ fn outputs(typed: &LabelOutput, cloud: PathBuf, scene: Option<PathBuf>) -> Outpu
 fn conclude(
     mut report: RunReport,
     program: &str,
-    typed: &ArgMatches,
+    options: Map<String, Value>,
     recorder: &Recorder,
     path: Option<&Path>,
 ) -> Result<()> {
     report.program = program.to_owned();
     report.version = env!("CARGO_PKG_VERSION").to_owned();
-    report.options = options_in_effect(typed);
+    report.options = options;
     report.warnings = recorder.warnings();
     if let Some(path) = path {
         write_report(&report, path)?;

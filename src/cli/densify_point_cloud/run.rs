@@ -161,8 +161,7 @@ fn conclude(mut report: RunReport, job: &DensifyJob, typing: &Typing, log: &Log)
         report.program = "DensifyPointCloud".to_owned();
         report.version = env!("CARGO_PKG_VERSION").to_owned();
         report.options = typing.options.clone();
-        let (input, depth_maps) = (&job.input, &job.depth_maps);
-        effective::resolve(&mut report.options, input, &job.outputs, depth_maps, Some(&job.filter));
+        effective::resolve(&mut report.options, &job.input, &job.outputs, None, Some(&job.filter));
         write_report(&report, path)?;
     }
     Ok(())

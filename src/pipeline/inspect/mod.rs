@@ -28,8 +28,10 @@ pub enum Inspection {
     DepthMap(DepthMapFacts),
     /// `.ply`
     Cloud(CloudFacts),
-    /// A photograph, a mask or a label map.
-    Picture(PictureFacts),
+    /// A photograph.
+    Image(PictureFacts),
+    /// A PNG of few values or with a palette: label maps and masks look so.
+    LabelMap(PictureFacts),
     /// `.toml`
     ClassTable(ClassTableFacts),
 }
@@ -52,9 +54,11 @@ pub fn inspect(path: &Path) -> Result<Inspection> {
             "dmap" => depth_map::inspect(path).map(Inspection::DepthMap),
             "ply" => cloud::inspect(path).map(Inspection::Cloud),
             "toml" => picture::inspect_table(path).map(Inspection::ClassTable),
-            "png" | "jpg" | "jpeg" | "tif" | "tiff" | "bmp" | "pgm" | "ppm" | "pnm" => {
-                picture::inspect(path).map(Inspection::Picture)
-            }
+            "png" | "jpg" | "jpeg" | "tif" | "tiff" | "bmp" | "pgm" | "ppm" | "pnm" => picture::inspect(path)
+                .map(|facts| match facts.is_label_map() {
+                    true => Inspection::LabelMap(facts),
+                    false => Inspection::Image(facts),
+                }),
             _ => Err(Error::content(
                 path,
                 "not a kind of file known here: scene (.mvs), depth map (.dmap), cloud (.ply), image, class table \

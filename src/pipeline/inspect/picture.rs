@@ -24,6 +24,15 @@ pub struct PictureFacts {
     pub colors: Vec<ColorShare>,
 }
 
+impl PictureFacts {
+    /// Whether this looks like a label map: a PNG of few colours, or of few greys.
+    pub fn is_label_map(&self) -> bool {
+        let is_grey = self.colors.iter().all(|c| c.color[0] == c.color[1] && c.color[1] == c.color[2]);
+        let is_png = Path::new(&self.file).extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+        is_png && !self.colors.is_empty() && (!is_grey || self.colors.len() <= MAX_IDS)
+    }
+}
+
 /// A colour of a label map.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColorShare {
@@ -35,6 +44,8 @@ pub struct ColorShare {
     pub share: f64,
 }
 
+/// More distinct greys may be a grey photograph.
+const MAX_IDS: usize = 64;
 /// More distinct colours make a photograph.
 const MAX_COLORS: usize = 256;
 

@@ -197,7 +197,7 @@ fn read_matrix(path: &Path) -> Result<Matrix> {
 fn write_matrix(path: &Path, matrix: Option<Matrix>) -> Result<()> {
     let matrix = matrix.ok_or_else(|| Error::content(path, "the values do not fill the map"))?;
     let mut file = AtomicFile::create(path)?;
-    matrix.write(&mut file).map_err(|e| Error::format(path, e))?;
+    matrix.write(&mut file).map_err(|e| Error::writing(path, e))?;
     file.commit()
 }
 
