@@ -1,7 +1,7 @@
 //! Work on the cloud that a scene already has: filter it by visibility, take its well-seen points, tell their scale.
 
 use super::job::{Outputs, SceneArchive, SceneJob};
-use super::outputs::{check_places, cloud_rows, write_cloud};
+use super::outputs::{check_places, cloud_rows, summary, write_cloud};
 use super::prepare::load;
 use super::record::with_threads;
 use crate::cloud_filter::{PointViews, point_scales, point_visibility, swap_removed};
@@ -122,13 +122,13 @@ fn write_points(
     progress: &Progress,
 ) -> Result<()> {
     let start = Instant::now();
+    let resaved = resaved_archive(loaded, cloud.copied(), matches!(archive, SceneArchive::Project(_)));
     match archive {
-        SceneArchive::Interface => write_interface(path, &resaved_archive(loaded, cloud.copied(), false))?,
-        SceneArchive::Project(kind) => {
-            write_project(path, &resaved_archive(loaded, cloud.copied(), true), kind)?;
-        }
+        SceneArchive::Interface => write_interface(path, &resaved)?,
+        SceneArchive::Project(kind) => write_project(path, &resaved, kind)?,
     }
-    progress.event(Event::SceneSaved { path: path.to_owned(), elapsed: start.elapsed() });
+    let scene = summary(&resaved, archive == SceneArchive::Interface);
+    progress.event(Event::SceneSaved { path: path.to_owned(), scene, elapsed: start.elapsed() });
     Ok(())
 }
 

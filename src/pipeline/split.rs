@@ -1,6 +1,7 @@
 //! A scene with depth maps to scenes that can be fused one after the other.
 
 use super::job::{SceneArchive, SceneJob};
+use super::outputs::summary;
 use super::prepare::load;
 use super::record::with_threads;
 use crate::error::{Error, Result};
@@ -166,6 +167,7 @@ fn write_part(
         path.display(),
         chunk.area
     ));
-    progress.event(Event::SceneSaved { path: path.to_owned(), elapsed: start.elapsed() });
+    let scene = summary(&part, archive == SceneArchive::Interface);
+    progress.event(Event::SceneSaved { path: path.to_owned(), scene, elapsed: start.elapsed() });
     Ok(())
 }

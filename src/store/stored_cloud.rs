@@ -146,7 +146,7 @@ pub fn write_scaled(path: &Path, cloud: &dyn PointSource, scales: &[(f32, f32)])
         fields,
         comments: Vec::new(),
     };
-    let failed = |error: semvs_formats::Error| Error::format(path, error);
+    let failed = |error: semvs_formats::Error| Error::writing(path, error);
     let mut writer: PlyWriter<AtomicFile> =
         ply::PlyWriter::new(AtomicFile::create(path)?, &layout, cloud.len()).map_err(failed)?;
     let mut chunk = Cloud::default();
