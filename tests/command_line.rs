@@ -410,6 +410,16 @@ fn files_are_inspected_for_people_and_programs() {
     let truth = common::facade6().join("truth/truth.ply");
     let out = scratch.run(SEMVS, &[Path::new("inspect"), &truth]).ok();
     assert!(out.stdout.contains("encoding: binary little endian"), "{}", out.stdout);
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 4, 1);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.write_header().unwrap().write_image_data(&[0, 7, 1, 0, 0, 7, 0, 7]).unwrap();
+    scratch.write("ids.png", bytes);
+    let json = scratch.semvs("inspect ids.png --json").ok().stdout;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&json["kind"], &json["ids"][0]["id"]), (&"label-map".into(), &7.into()));
+    assert_eq!((&json["ids"][1]["id"], &json["ids"][1]["pixels"]), (&256.into(), &1.into()));
     scratch.write("x.bin", "????????");
     scratch.semvs("inspect x.bin").fails_naming(&["x.bin", "not a kind of file"]);
 }

@@ -23,6 +23,22 @@ pub enum UnknownLabel {
 /// Compressed data cannot grow by more than this (the bound of the deflate format, rounded up).
 const MAX_INFLATION: u64 = 1040;
 
+/// The values of a grey PNG as they stand; `None` for one in colours.
+///
+/// # Errors
+/// [`Error`] about `path`: unreadable, not a PNG, larger than the limits.
+pub fn grey_ids(path: &Path, limits: Limits) -> Result<Option<LabelMap>> {
+    let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    let info = png::Decoder::new(BufReader::new(file)).read_info();
+    let info = info.map_err(|e| Error::content(path, format!("not a readable PNG: {e}")))?;
+    if !matches!(info.info().color_type, png::ColorType::Grayscale | png::ColorType::GrayscaleAlpha) {
+        return Ok(None);
+    }
+    let (table, unknown) = (ClassTable::ids(), UnknownLabel::Refuse);
+    let reader = LabelReader { table, colors: HashMap::new(), table_is_assumed: true, unknown, limits };
+    reader.read(path, |_| Ok(())).map(Some)
+}
+
 /// How the pixels of a PNG file become class ids.
 #[derive(Clone, Debug)]
 pub(super) struct LabelReader {

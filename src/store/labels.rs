@@ -2,7 +2,7 @@
 
 use super::byte_cache::ByteCache;
 use super::label_png::LabelReader;
-pub use super::label_png::UnknownLabel;
+pub use super::label_png::{UnknownLabel, grey_ids};
 use super::paths::is_same_file;
 use crate::error::{Error, Result};
 use crate::geometry::Size;

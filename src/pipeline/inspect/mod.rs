@@ -8,7 +8,7 @@ mod values;
 
 pub use cloud::CloudFacts;
 pub use depth_map::DepthMapFacts;
-pub use picture::{ClassFacts, ClassTableFacts, ColorShare, PictureFacts};
+pub use picture::{ClassFacts, ClassTableFacts, ColorShare, IdShare, PictureFacts};
 pub use scene::{CameraFacts, ImageFacts, PointFacts, RoiFacts, SceneFacts};
 pub use values::{Bounds, Range};
 
@@ -30,7 +30,7 @@ pub enum Inspection {
     Cloud(CloudFacts),
     /// A photograph.
     Image(PictureFacts),
-    /// A PNG of few values or with a palette: label maps and masks look so.
+    /// A PNG of few colours or values: label maps and masks look so.
     LabelMap(PictureFacts),
     /// `.toml`
     ClassTable(ClassTableFacts),

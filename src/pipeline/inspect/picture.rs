@@ -2,8 +2,11 @@
 
 use super::bytes_of;
 use crate::error::{Error, Result};
-use crate::semantics::ClassTable;
+use crate::scene::LabelMap;
+use crate::semantics::{ClassId, ClassTable};
 use crate::store::images::{image_size, load_color};
+use crate::store::labels::{count_classes, grey_ids};
+use semvs_formats::Limits;
 use serde::Serialize;
 use std::collections::HashMap;
 use std::path::Path;
@@ -22,21 +25,37 @@ pub struct PictureFacts {
     /// Distinct colours with their numbers of pixels, most frequent first, when there are few, as in label maps.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub colors: Vec<ColorShare>,
+    /// Distinct values of a grey PNG with their numbers of pixels, most frequent first, when there are few.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ids: Vec<IdShare>,
 }
 
 impl PictureFacts {
-    /// Whether this looks like a label map: a PNG of few colours, or of few greys.
+    /// Whether this looks like a label map: a PNG of few colours or values.
     pub fn is_label_map(&self) -> bool {
-        let is_grey = self.colors.iter().all(|c| c.color[0] == c.color[1] && c.color[1] == c.color[2]);
-        let is_png = Path::new(&self.file).extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
-        is_png && !self.colors.is_empty() && (!is_grey || self.colors.len() <= MAX_IDS)
+        is_png(Path::new(&self.file)) && !(self.colors.is_empty() && self.ids.is_empty())
     }
+}
+
+fn is_png(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+}
+
+/// A value of a label map.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct IdShare {
+    /// The value.
+    pub id: u16,
+    /// Pixels.
+    pub pixels: u64,
+    /// The same as a share of all pixels.
+    pub share: f64,
 }
 
 /// A colour of a label map.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColorShare {
-    /// Red, green, blue; grey ids have three equal values.
+    /// Red, green, blue.
     pub color: [u8; 3],
     /// Pixels.
     pub pixels: u64,
@@ -44,13 +63,44 @@ pub struct ColorShare {
     pub share: f64,
 }
 
-/// More distinct greys may be a grey photograph.
+/// More distinct values make a grey photograph, if all are below 256.
 const MAX_IDS: usize = 64;
 /// More distinct colours make a photograph.
 const MAX_COLORS: usize = 256;
 
 pub(super) fn inspect(path: &Path) -> Result<PictureFacts> {
     let size = image_size(path)?;
+    let ids = if is_png(path) { grey_ids(path, Limits::default())? } else { None };
+    let (colors, ids) = match ids {
+        Some(ids) => (Vec::new(), id_shares(&ids)),
+        None => (color_shares(path)?, Vec::new()),
+    };
+    Ok(PictureFacts {
+        file: path.display().to_string(),
+        bytes: bytes_of(path)?,
+        width: size.width,
+        height: size.height,
+        colors,
+        ids,
+    })
+}
+
+/// The values of a grey image, if they are few.
+fn id_shares(map: &LabelMap) -> Vec<IdShare> {
+    let counts = count_classes(map);
+    let most = if counts.keys().any(|id| id.0 > u16::from(u8::MAX)) { MAX_COLORS } else { MAX_IDS };
+    if counts.len() > most {
+        return Vec::new();
+    }
+    let area = map.data().len().max(1) as f64;
+    let share = |(id, pixels): (ClassId, u64)| IdShare { id: id.0, pixels, share: pixels as f64 / area };
+    let mut shares: Vec<IdShare> = counts.into_iter().map(share).collect();
+    shares.sort_by_key(|s| (std::cmp::Reverse(s.pixels), s.id));
+    shares
+}
+
+/// The colours of an image, if they are few.
+fn color_shares(path: &Path) -> Result<Vec<ColorShare>> {
     let image = load_color(path)?;
     let mut counts: HashMap<[u8; 3], u64> = HashMap::new();
     for color in image.data() {
@@ -60,19 +110,13 @@ pub(super) fn inspect(path: &Path) -> Result<PictureFacts> {
             break;
         }
     }
-    let area = size.area().max(1) as f64;
+    let area = image.data().len().max(1) as f64;
     let mut colors: Vec<ColorShare> = counts
         .into_iter()
         .map(|(color, pixels)| ColorShare { color, pixels, share: pixels as f64 / area })
         .collect();
     colors.sort_by_key(|c| (std::cmp::Reverse(c.pixels), c.color));
-    Ok(PictureFacts {
-        file: path.display().to_string(),
-        bytes: bytes_of(path)?,
-        width: size.width,
-        height: size.height,
-        colors,
-    })
+    Ok(colors)
 }
 
 /// A class table.
