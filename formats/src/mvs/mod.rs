@@ -4,6 +4,7 @@ mod boost;
 mod boxes;
 mod check;
 mod interface;
+mod losses;
 mod mesh;
 mod project;
 mod repair;
