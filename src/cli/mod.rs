@@ -5,6 +5,7 @@ mod console;
 mod dense_config;
 mod densify_point_cloud;
 mod duration;
+mod exchange_args;
 mod label_options;
 mod listen;
 mod one_line;

@@ -51,6 +51,8 @@ fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crat
         Command::Densify(args) => commands::densify(args, typed, recorder),
         Command::Fuse(args) => commands::fuse(args, typed, recorder),
         Command::Convert(args) => commands::convert(args, &recorder.progress()),
+        Command::Import(args) => commands::import(args, &recorder.progress()),
+        Command::Export(args) => commands::export(args, &recorder.progress()),
         Command::Inspect(args) => commands::inspect(args),
         Command::Evaluate(args) => commands::evaluate(args),
     }?;

@@ -1,7 +1,9 @@
 //! The command line of `semvs`, as typed.
 
+use super::exchange_args::{ExportArgs, ImportArgs};
 use super::label_options::{LabelInput, PlyLayout};
 use super::options::SharedOptions;
+use crate::store::colmap::Pass;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -35,6 +37,8 @@ Examples:
       the same with a class for every point, without sky and obstacles, and one cloud per class
   semvs fuse scene.mvs --depth-maps depthmaps -o cloud.ply --number-views-fuse 2
       fuse depth maps that exist, from here or from OpenMVS
+  semvs densify colmap/dense
+      the same from COLMAP's undistorted workspace, without conversion
   semvs inspect depthmaps/depth0000.dmap
       what is in a file";
 
@@ -44,6 +48,8 @@ pub(crate) enum Command {
     Densify(Box<DensifyArgs>),
     Fuse(Box<FuseArgs>),
     Convert(ConvertArgs),
+    Import(ImportArgs),
+    Export(ExportArgs),
     Inspect(InspectArgs),
     Evaluate(EvaluateArgs),
     Compare(CompareArgs),
@@ -111,6 +117,15 @@ pub(crate) enum ColmapPass {
     Geometric,
     /// of the first pass
     Photometric,
+}
+
+impl From<ColmapPass> for Pass {
+    fn from(typed: ColmapPass) -> Self {
+        match typed {
+            ColmapPass::Geometric => Pass::Geometric,
+            ColmapPass::Photometric => Pass::Photometric,
+        }
+    }
 }
 
 /// Shared options that have no effect when nothing is estimated; taken all the same, so that a command line can be

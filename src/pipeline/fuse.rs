@@ -14,7 +14,7 @@ use crate::geometry::{Camera, Size};
 use crate::progress::{Event, Progress};
 use crate::report::RunReport;
 use crate::scene::{PointSource, ResolutionOptions, View, ViewIndex};
-use crate::store::cameras::working_cameras;
+use crate::store::cameras::{camera_of_map, working_cameras};
 use crate::store::colmap::{ColmapMaps, Pass};
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::LoadedScene;
@@ -115,10 +115,12 @@ fn map_cameras(loaded: &LoadedScene, store: &DepthStore, strict: bool) -> Result
         if let Some(size) = of_map.filter(|_| store.is_colmap()) {
             return Some(full.scaled_per_axis(size));
         }
-        let longest = match of_map {
-            Some(size) => size.longest(),
-            None => (u64::from(full.size().longest()) * u64::from(small) / u64::from(large)) as u32,
-        };
+        if let Some((size, calibration)) = of_map.zip(view.calibration.as_ref()) {
+            // A map of another shape than its image is found to be unusable by its size.
+            let fitting = camera_of_map(calibration, full.size(), size);
+            return Some(fitting.unwrap_or_else(|| full.clone()));
+        }
+        let longest = (u64::from(full.size().longest()) * u64::from(small) / u64::from(large)) as u32;
         let at = ResolutionOptions { level: 0, max: longest.max(1), ..ResolutionOptions::default() };
         view.calibration.as_ref().map(|c| c.camera_at(at.working_size(full.size())))
     };

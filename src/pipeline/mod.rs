@@ -6,11 +6,15 @@ mod convert;
 mod densify;
 mod estimate;
 mod evaluate;
+mod export;
+mod export_colmap;
+mod export_rasters;
 mod filter;
 mod finished;
 mod fuse;
 mod fusing;
 mod images;
+mod import;
 mod inputs;
 pub mod inspect;
 mod job;
@@ -26,8 +30,12 @@ pub use actions::{export_neighbors, export_roi, import_roi};
 pub use convert::{ConvertJob, convert};
 pub use densify::{DEPTH_MAP, densify};
 pub use evaluate::{EvaluateJob, evaluate};
+pub use export::{ExportSceneJob, SceneExport, export_scene};
+pub use export_colmap::{ExportColmapJob, export_colmap};
+pub use export_rasters::{ExportRastersJob, Planes, export_rasters};
 pub use finished::{CloudJob, CloudWork, finished_cloud};
 pub use fuse::fuse;
+pub use import::{ImportDepthsJob, ImportSceneJob, import_depths, import_scene};
 pub use job::{
     AcrossViews, DensifyJob, DepthMapsJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob,
     SceneArchive, SceneJob,

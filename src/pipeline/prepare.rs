@@ -8,7 +8,10 @@ use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::progress::{Event, Progress, SceneSummary};
-use crate::scene::{ImageId, ViewIndex, ViewNeighbors, estimate_roi, looks_like_tower, select_neighbors};
+use crate::scene::{
+    ImageId, NeighborOptions, Scene, ViewIndex, ViewNeighbors, estimate_roi, looks_like_tower,
+    select_neighbors,
+};
 use crate::store::import::{LoadedScene, load_scene};
 use semvs_formats::Limits;
 use semvs_formats::mvs::Container;
@@ -136,6 +139,15 @@ pub(super) fn prepare(
     let prepared = Prepared { loaded, cameras, dropped, neighbors, images, masks, labels };
     report_pairs(&prepared, start, progress)?;
     Ok(prepared)
+}
+
+/// The neighbours of all views by the default rules: those stored with the scene, else by its sparse points; none where
+/// the views cannot be compared.
+///
+/// # Errors
+/// As [`select_neighbors`].
+pub(super) fn neighbors_of(scene: &Scene, cameras: &[Option<Camera>]) -> Result<Vec<ViewNeighbors>> {
+    select_neighbors(scene, cameras, &NeighborOptions::default())
 }
 
 /// Pixels of the views that all threads work on at a time: each on a view and its neighbours.

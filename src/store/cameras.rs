@@ -95,6 +95,17 @@ fn missing(loaded: &LoadedScene, view: ViewIndex) -> Error {
     Error::content(&first, what)
 }
 
+/// The camera of a depth map of size `map`, of an image of size `full`: as [`Calibration::camera_at`], but where
+/// `map` was rounded by another rule, each axis has a factor of its own. `None` if it is not the image's shape.
+pub fn camera_of_map(calibration: &Calibration, full: Size, map: Size) -> Option<Camera> {
+    let at = ResolutionOptions { level: 0, max: map.longest(), ..ResolutionOptions::default() };
+    if at.working_size(full) == map {
+        return Some(calibration.camera_at(map));
+    }
+    let fits = map.longest() <= full.longest() && same_shape(full, map);
+    fits.then(|| calibration.camera_at(full).scaled_per_axis(map))
+}
+
 /// A photograph smaller than the scene says by more than this is another one, a thumbnail perhaps.
 const MOST_REDUCED: f64 = 1.0 / 8.0;
 

@@ -1,5 +1,6 @@
 //! Every access to files: scenes, photographs, masks, depth maps, clouds.
 
+pub mod archive;
 pub mod atomic;
 pub(crate) mod byte_cache;
 pub mod cameras;
@@ -17,6 +18,7 @@ pub mod labels;
 pub mod masks;
 pub mod packed;
 pub mod paths;
+pub mod rasters;
 pub mod spool;
 mod stale_clouds;
 pub mod stored_cloud;

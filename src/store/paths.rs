@@ -76,6 +76,13 @@ pub fn name_relative_to(path: &Path, folder: &Path) -> String {
     up.chain(down).collect::<Vec<_>>().join("/")
 }
 
+/// `path` followed by `suffix` in its last component.
+pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut text = path.as_os_str().to_owned();
+    text.push(suffix);
+    PathBuf::from(text)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

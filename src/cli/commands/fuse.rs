@@ -3,7 +3,7 @@
 use super::{cloud_path, conclude, default_cloud, effective, is_typed, outputs, resolver, spare_workspace};
 use crate::cli::listen::Recorder;
 use crate::cli::resolve::Resolver;
-use crate::cli::semvs_args::{ColmapPass, FuseArgs};
+use crate::cli::semvs_args::FuseArgs;
 use crate::error::Result;
 use crate::pipeline::{self, DepthMapsJob, FuseJob};
 use crate::store::colmap::Pass;
@@ -45,10 +45,7 @@ fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<F
 }
 
 fn depth_maps(args: &FuseArgs) -> DepthMapsJob {
-    let pass = args.maps.map(|maps| match maps {
-        ColmapPass::Geometric => Pass::Geometric,
-        ColmapPass::Photometric => Pass::Photometric,
-    });
+    let pass = args.maps.map(Pass::from);
     match (&args.depth_maps, &args.shared.run.working_folder) {
         (Some(folder), _) => DepthMapsJob::Folder(folder.clone()),
         (None, _) if pass.is_some() => DepthMapsJob::Colmap(pass),

@@ -5,16 +5,21 @@ mod convert;
 mod densify;
 pub(crate) mod effective;
 mod evaluate;
+mod export;
 mod fuse;
+mod import;
 mod inspect;
 
 pub(crate) use compare::{INCOMPARABLE, compare};
 pub(crate) use convert::convert;
 pub(crate) use densify::densify;
 pub(crate) use evaluate::evaluate;
+pub(crate) use export::export;
 pub(crate) use fuse::fuse;
+pub(crate) use import::import;
 pub(crate) use inspect::inspect;
 
+use super::exchange_args::ArchiveArgs;
 use super::label_options::LabelOutput;
 use super::listen::Recorder;
 use super::options::SharedOptions;
@@ -27,6 +32,7 @@ use crate::store::cloud::PlyLayout;
 use crate::store::colmap::Workspace;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
+use semvs_formats::mvs::{ArchiveKind, Container, NEWEST_VERSION};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -77,6 +83,21 @@ fn spare_workspace(scene: &Path, outputs: &Outputs) -> Result<()> {
             Err(Error::content(path, "this is a file of COLMAP; choose another name for the output"))
         }
         None => Ok(()),
+    }
+}
+
+/// The kind of archive that is asked for, if one is.
+fn archive_kind(typed: ArchiveArgs) -> Option<Container> {
+    let newest = Container::Interface { version: NEWEST_VERSION };
+    let project = |kind| Container::Project { kind };
+    match (typed.mvs_version, typed.archive_type) {
+        (Some(version), _) => Some(Container::Interface { version }),
+        (None, Some(0)) => Some(project(ArchiveKind::Text)),
+        (None, Some(1)) => Some(project(ArchiveKind::Binary)),
+        (None, Some(2)) => Some(project(ArchiveKind::Zlib)),
+        (None, Some(3)) => Some(project(ArchiveKind::Zstd)),
+        (None, Some(_)) => Some(newest),
+        (None, None) => None,
     }
 }
 

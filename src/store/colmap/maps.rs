@@ -51,8 +51,12 @@ pub struct ColmapMapHeader {
 impl ColmapMaps {
     /// The maps that `pass` left in `workspace` for the calibrated views of `scene`, which is the workspace's.
     pub fn new(workspace: &Workspace, pass: Pass, scene: &Scene) -> Self {
-        let prefix =
-            format!("{}/", crate::store::paths::name_relative_to(&workspace.images, &workspace.root));
+        Self::of_scene(workspace, pass, scene, &workspace.root)
+    }
+
+    /// [`ColmapMaps::new`] for a scene whose names are relative to `folder`.
+    pub fn of_scene(workspace: &Workspace, pass: Pass, scene: &Scene, folder: &Path) -> Self {
+        let prefix = workspace.image_prefix(folder);
         let ranges = plausible_depths(scene);
         let views = scene.views.iter().zip(ranges).filter_map(|(view, plausible)| {
             let calibration = view.calibration.as_ref()?;
