@@ -117,6 +117,21 @@ fn a_version_keeps_the_fields_it_has() {
     }
 }
 
+/// Every version holds less than the next, in words; nothing is said to be lost that is not.
+#[test]
+fn losses_are_named() {
+    let newest = read(&with_box(corpus("i7"))).scene;
+    let losses = |version| newest.losses(Container::Interface { version });
+    let counts: Vec<usize> = (0..=7).map(|version| losses(version).len()).collect();
+    assert_eq!(counts, [8, 6, 5, 4, 3, 2, 1, 0]);
+    for version in 0..=7 {
+        let scene = read(&write(&newest, version)).scene;
+        assert_eq!(scene.losses(Container::Interface { version }), Vec::<&str>::new(), "version {version}");
+    }
+    let project = newest.losses(Container::Project { kind: mvs::ArchiveKind::Binary });
+    assert!(project.iter().any(|lost| lost.contains("lines")), "{project:?}");
+}
+
 /// Version 0 has no resolution, so its intrinsics are normalised: 500 / 640 and (310.25 + 0.5) / 640 - 0.5.
 #[test]
 fn version_0_gets_normalised_intrinsics() {
