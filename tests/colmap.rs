@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Depth maps at half size, without a region of interest.
 const HALF: &str = "--resolution-level 1 --min-resolution 160 --estimate-roi 0";
-/// OpenMVS's filtered maps are fused as they are.
+/// Label maps of the photographs.
 const LABELS: &str = "--label-path labels --class-table 3dom-facade";
 
 /// facade6 with `dense/`: its photographs and the sparse model of this encoding.
@@ -289,6 +289,11 @@ fn what_colmaps_fusion_needs_is_written() {
     assert_eq!((&fused.positions, &views.images), (&original.positions, &original.views.images));
     let header = String::from_utf8_lossy(&scratch.read("new/fused.ply")[..200]).into_owned();
     assert!(header.find("float nx").unwrap() < header.find("uchar red").unwrap(), "{header}");
+    scratch.semvs("import new -o round/scene.mvs --fused").ok();
+    let round = cloud(&scratch.path("round/scene.ply"));
+    assert_eq!((&round.positions, &round.views.images), (&original.positions, &original.views.images));
+    assert_eq!((&round.normals, &round.colors), (&original.normals, &original.colors));
+    scratch.semvs("import new -o new/fused.mvs --fused").fails_naming(&["fused.ply", "file of COLMAP"]);
     assert_eq!(scratch.read("new/images/0003.jpg"), scratch.read("images/0003.jpg"));
     scratch
         .semvs("densify new --resolution-level 2 --min-resolution 80 --number-views 2 --geometric-iters 0")
@@ -315,4 +320,32 @@ fn colmap_maps_become_depth_maps() {
     scratch.semvs("fuse dense -o b.ply --estimate-roi 0").ok();
     assert_eq!(scratch.read("a.ply"), scratch.read("b.ply"), "the same maps by another way");
     scratch.semvs("import dense -o x.mvs --maps photometric").fails_naming(&["photometric"]);
+}
+
+/// Every `semvs` line of docs/colmap.md runs, and leaves what the page says.
+#[cfg(unix)]
+#[test]
+fn the_page_about_colmap_is_true() {
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/colmap.md")).unwrap();
+    let commands: Vec<&str> = page.lines().filter(|line| line.starts_with("semvs ")).collect();
+    assert!(commands.len() >= 7, "{commands:?}");
+    let scratch = with_colmap_maps();
+    for command in commands {
+        let command = command.replacen("semvs", common::SEMVS, 1);
+        scratch.run("sh", &["-c", &command]).ok();
+    }
+    for name in [
+        "dense/semvs/dense.ply",
+        "dense/semvs/dense.mvs",
+        "dense/semvs/depth0005.dmap",
+        "labelled.ply",
+        "ours/sparse/points3D.bin",
+        "ours/stereo/depth_maps/0013.jpg.geometric.bin",
+        "ours/images/0013.jpg",
+        "mvs/depth0005.dmap",
+        "arrays/0013.confidence.npy",
+        "mine.ply",
+    ] {
+        assert!(scratch.has(name), "{name}");
+    }
 }

@@ -20,7 +20,7 @@ pub(crate) struct ImportArgs {
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT")]
     pub(crate) output: PathBuf,
     /// The folder holds depths of this scene's images: a .mvs file or a COLMAP workspace
-    #[arg(long, value_name = "SCENE", conflicts_with_all = ["image_path", "mvs_version", "archive_type", "maps"])]
+    #[arg(long, value_name = "SCENE", conflicts_with_all = ["image_path", "mvs_version", "archive_type", "maps", "fused"])]
     pub(crate) scene: Option<PathBuf>,
     /// Folder of the undistorted images [default: images/ in or beside the model]
     #[arg(long, value_name = "DIR")]
@@ -30,6 +30,9 @@ pub(crate) struct ImportArgs {
     /// Also write COLMAP's depth and normal maps of this pass as depthNNNN.dmap beside the scene
     #[arg(long, value_name = "PASS", value_enum)]
     pub(crate) maps: Option<ColmapPass>,
+    /// Also write COLMAP's fused.ply with the views of fused.ply.vis beside the scene: OUT.ply
+    #[arg(long)]
+    pub(crate) fused: bool,
     /// Values of PNG depths are depth times this; 1000: millimetres in a scene of metres
     #[arg(long, value_name = "S", default_value_t = 1000.0, requires = "scene")]
     pub(crate) depth_scale: f32,

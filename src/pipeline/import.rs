@@ -8,14 +8,15 @@ use crate::progress::Progress;
 use crate::report::{OutputReport, RunReport};
 use crate::scene::{DepthEstimate, DepthMap, ImageId, ResolutionOptions, Scene, ViewIndex};
 use crate::store::archive::{move_sizes, same_place, write_archive};
+use crate::store::atomic::AtomicFile;
 use crate::store::cameras::{camera_of_map, working_cameras};
 use crate::store::colmap::{ColmapMaps, Pass, Workspace};
 use crate::store::depth_store::DepthStore;
 use crate::store::import::{LoadedScene, load_scene};
 use crate::store::rasters::{RasterFormat, read_depth};
 use rayon::prelude::*;
-use semvs_formats::Limits;
 use semvs_formats::mvs::Container;
+use semvs_formats::{Limits, ply};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,8 @@ pub struct ImportSceneJob {
     pub container: Container,
     /// Also write the maps of this pass as `depthNNNN.dmap` beside the scene.
     pub maps: Option<Pass>,
+    /// Also write the cloud of COLMAP's fusion, with views, beside the scene: `SCENE.ply`.
+    pub fused: bool,
 }
 
 /// `import` of a folder of depths.
@@ -74,6 +77,18 @@ pub fn import_scene(job: &ImportSceneJob, progress: &Progress) -> Result<RunRepo
     write_archive(&job.scene, &archive, job.container)?;
     let points = archive.points.positions.len() as u64;
     let mut outputs = vec![row(&job.scene, "scene", Some(points))];
+    if job.fused {
+        let path = job.scene.with_extension("ply");
+        if workspace.owns(&path) {
+            return Err(Error::content(&path, "this is a file of COLMAP; choose another name for the scene"));
+        }
+        let cloud = workspace.read_fused(&limits)?;
+        let layout = ply::Layout::openmvs(!cloud.colors.is_empty(), !cloud.normals.is_empty(), false);
+        let mut file = AtomicFile::create(&path)?;
+        ply::write_cloud(&mut file, &layout, &cloud).map_err(|e| Error::format(&path, e))?;
+        file.commit()?;
+        outputs.push(row(&path, "dense cloud", Some(cloud.len() as u64)));
+    }
     if let Some(pass) = job.maps {
         // Names in the scene just written are relative to its folder.
         let loaded = load_scene(&job.scene, folder, &limits)?;

@@ -34,6 +34,7 @@ pub(crate) fn import(args: &ImportArgs, progress: &Progress) -> Result<()> {
                 container: archive_kind(args.archive)
                     .unwrap_or(Container::Interface { version: NEWEST_VERSION }),
                 maps: args.maps.map(Pass::from),
+                fused: args.fused,
             };
             pipeline::import_scene(&job, progress)?
         }

@@ -1,5 +1,6 @@
 //! COLMAP's folders: a workspace as a scene, its depth maps, and what its programs read.
 
+mod fused;
 mod maps;
 mod scene;
 mod workspace;
