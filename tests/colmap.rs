@@ -327,7 +327,8 @@ fn colmap_maps_become_depth_maps() {
 #[test]
 fn the_page_about_colmap_is_true() {
     let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/colmap.md")).unwrap();
-    let commands: Vec<&str> = page.lines().filter(|line| line.starts_with("semvs ")).collect();
+    let blocks = page.split("```sh\n").skip(1).map(|block| block.split("```").next().unwrap());
+    let commands: Vec<&str> = blocks.flat_map(str::lines).filter(|line| line.starts_with("semvs ")).collect();
     assert!(commands.len() >= 7, "{commands:?}");
     let scratch = with_colmap_maps();
     for command in commands {
