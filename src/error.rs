@@ -35,6 +35,9 @@ pub enum Error {
         /// What is wrong with it and what to do.
         what: String,
     },
+    /// More memory is needed than there is.
+    #[error("out of memory: {0}")]
+    OutOfMemory(String),
     /// The scene or the options cannot be used as given.
     #[error("{0}")]
     Invalid(String),

@@ -46,6 +46,7 @@ fn job(depth_maps: Vec<PathBuf>, labels: Option<LabelJob>, cloud: &Path) -> Conv
         report: None,
         names_from_scene: true,
         sparse_cloud: false,
+        allow_empty: false,
     };
     ConvertJob { depth_maps, working_folder: Some(facade()), labels, outputs }
 }

@@ -20,6 +20,14 @@ pub use semvs::semvs;
 
 use std::io::Write;
 
+/// The exit code of a failure: 137, which callers take for "out of memory" because the system kills with it, or 1.
+fn exit_code(error: &crate::Error) -> std::process::ExitCode {
+    match error {
+        crate::Error::OutOfMemory(_) => std::process::ExitCode::from(137),
+        _ => std::process::ExitCode::FAILURE,
+    }
+}
+
 /// To stdout; a closed pipe is no failure.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();

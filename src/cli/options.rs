@@ -117,7 +117,8 @@ pub(crate) struct RoiOptions {
     /// Border of the region: above 0 its size is multiplied by this, below 0 its half size grows by the amount
     #[arg(long, value_name = "B", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) roi_border: f32,
-    /// Cameras that climb a tower: 0 = do not look for them, 1 to 4 = say so; no points are made up for them
+    /// Points made up for cameras that climb a tower: 0 = none, 1 = replace the sparse points, 2 = add to them, 3 = find
+    /// neighbours by them, 4 = both; below 0 the cameras are not asked
     #[arg(long, value_name = "MODE", default_value_t = 4, allow_negative_numbers = true)]
     pub(crate) tower_mode: i32,
     /// Drop the points outside the region

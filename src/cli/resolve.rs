@@ -6,7 +6,7 @@ use super::options::{FilterKind, SharedOptions};
 use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions};
-use crate::pipeline::{AcrossViews, FilterJob, LabelJob, MaskJob, RoiJob, SceneJob};
+use crate::pipeline::{AcrossViews, FilterJob, LabelJob, MaskJob, RoiJob, SceneJob, TowerJob, TowerWork};
 use crate::scene::{NeighborOptions, OutsideRoi, PairingOptions, ResolutionOptions, RoiEstimation};
 use crate::semantics::{ClassRules, Consistency};
 use crate::stereo::{CpuLevel, StereoOptions};
@@ -46,11 +46,7 @@ impl<'a> Resolver<'a> {
     /// A value out of range; options that need labels without labels.
     pub(crate) fn scene(&self, scene: PathBuf, working_folder: PathBuf) -> Result<SceneJob> {
         let images = &self.options.images;
-        let tower_mode = self.options.roi.tower_mode;
-        if !(0..=4).contains(&tower_mode) {
-            let what = "points of a tower are not made up; use 0, or 1 to 4, which only look for one";
-            return Err(Error::invalid(format!("--tower-mode {tower_mode} is refused: {what}")));
-        }
+        let tower = tower(self.options.roi.tower_mode, working_folder.join("tower.ply"))?;
         let path = |typed: &Option<PathBuf>| typed.as_deref().map(self.place);
         Ok(SceneJob {
             scene,
@@ -61,8 +57,9 @@ impl<'a> Resolver<'a> {
             roi: self.roi()?,
             masks: masks(images.ignore_mask_label, images.mask_path.clone())?,
             labels: labels(&self.options.labels.input, self.place)?,
-            look_for_tower: tower_mode > 0,
+            tower,
             strict: self.options.run.strict,
+            like_openmvs: false,
             max_threads: self.options.run.max_threads as usize,
         })
     }
@@ -199,6 +196,19 @@ impl<'a> Resolver<'a> {
         options.check()?;
         Ok(options)
     }
+}
+
+/// What `--tower-mode` asks for; the cloud of a tower goes to `cloud`.
+fn tower(mode: i32, cloud: PathBuf) -> Result<Option<TowerJob>> {
+    let work = match mode.unsigned_abs() {
+        0 => return Ok(None),
+        1 => TowerWork::Replace,
+        2 => TowerWork::Append,
+        3 => TowerWork::Neighbors,
+        4 => TowerWork::NeighborsAndAppend,
+        _ => return Err(Error::invalid(format!("--tower-mode {mode}: give -4 to 4"))),
+    };
+    Ok(Some(TowerJob { work, unchecked: mode < 0, any_direction: false, cloud }))
 }
 
 fn masks(ignore: i32, folder: Option<PathBuf>) -> Result<Option<MaskJob>> {

@@ -4,7 +4,7 @@ use super::console::{Console, Level};
 use super::listen::Recorder;
 use super::one_line::{one_line, printable};
 use super::semvs_args::{Command, SemvsArgs};
-use super::{commands, complain, print};
+use super::{commands, complain, exit_code, print};
 use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use std::ffi::OsString;
@@ -30,7 +30,10 @@ pub fn semvs(words: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             complain(&format!("error: {}\n", printable(&error.to_string())));
-            failure
+            match error {
+                crate::Error::OutOfMemory(_) => exit_code(&error),
+                _ => failure,
+            }
         }
     }
 }

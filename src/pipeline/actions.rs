@@ -7,8 +7,9 @@ use crate::error::{Error, Result};
 use crate::progress::{Event, Progress};
 use crate::store::atomic::AtomicFile;
 use crate::store::export::{interface_archive, write_interface};
-use crate::store::import::LoadedScene;
-use semvs_formats::{Limits, neighbors_file, roi};
+use crate::store::import::{LoadedScene, load_scene};
+use semvs_formats::{Limits, mvs, neighbors_file, roi};
+use std::io::Read;
 use std::path::Path;
 use std::time::Instant;
 
@@ -57,6 +58,19 @@ pub fn export_neighbors(job: &SceneJob, path: &Path, progress: &Progress) -> Res
     let mut file = AtomicFile::create(path)?;
     neighbors_file::write(&mut file, lists.iter().map(Vec::as_slice)).map_err(|e| Error::writing(path, e))?;
     file.commit()
+}
+
+/// Whether the scene is a project archive, with what OpenMVS would take for its dense cloud.
+pub fn is_project(job: &SceneJob) -> bool {
+    let mut head = Vec::with_capacity(64);
+    let read = std::fs::File::open(&job.scene).and_then(|file| file.take(64).read_to_end(&mut head));
+    let container = read.ok().and_then(|_| mvs::identify(&head).ok().flatten());
+    matches!(container, Some(mvs::Container::Project { .. }))
+}
+
+/// Whether the scene can be read, be its images there or not.
+pub fn is_readable(job: &SceneJob) -> bool {
+    load_scene(&job.scene, &job.working_folder, &Limits::default()).is_ok()
 }
 
 /// Cameras stay as they are stored.

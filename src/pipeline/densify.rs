@@ -14,13 +14,16 @@ use super::skip::Labels;
 use super::sparse::SparseCloud;
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions, WithNormals};
+use crate::geometry::{Camera, Size};
 use crate::progress::{Event, Progress};
 use crate::report::{OutputReport, RunReport};
 use crate::scene::{PointSource, ViewIndex};
 use crate::stereo::CpuLevel;
 use crate::store::atomic::create_folder;
 use crate::store::cameras::working_cameras;
-use crate::store::depth_store::DepthStore;
+use crate::store::cloud::PlyLayout;
+use crate::store::depth_store::{DepthStore, Existing};
+use crate::store::import::LoadedScene;
 use nalgebra::Vector3;
 use semvs_formats::Limits;
 use std::path::Path;
@@ -49,7 +52,10 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
     create_folder(&job.depth_maps)?;
     let loaded = load(&job.input, progress)?;
-    let cameras = working_cameras(&loaded, &job.resolution, job.input.strict)?;
+    let mut cameras = working_cameras(&loaded, &job.resolution, job.input.strict)?;
+    if job.only_fuses() {
+        take_sizes_of_maps(&loaded, &mut cameras, &job.depth_maps, progress);
+    }
     check_depth_maps(&loaded, &cameras, &job.depth_maps)?;
     clock.stage("load");
     let mut prepared = prepare(&job.input, loaded, cameras, true, progress)?;
@@ -57,7 +63,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     let store = caching_store(&job.input, &prepared, &job.depth_maps);
     clock.stage("prepare");
 
-    let use_existing = job.stereo.geometric_iterations == 0;
+    let use_existing = job.stereo.geometric_iterations == 0 || job.input.like_openmvs;
     let existing = existing_maps(&prepared, &store, use_existing, job.input.strict, progress)?;
     let maps = name_unmatched(&mut prepared, &existing, job.input.strict, progress)?;
     let fusion = match job.depth_maps_only {
@@ -94,6 +100,34 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     clock.stage("write");
     clock.finish(&mut report);
     Ok(report)
+}
+
+/// Gives the views whose depth map is of another size than the options say, but of this scene, a camera of that size:
+/// whoever only fuses means the maps that are there.
+fn take_sizes_of_maps(
+    loaded: &LoadedScene,
+    cameras: &mut [Option<Camera>],
+    folder: &Path,
+    progress: &Progress,
+) {
+    let store = DepthStore::new(folder, loaded.search.clone(), 0, Limits::default());
+    let mut other = 0usize;
+    for (view, camera) in loaded.scene.views.iter().zip(cameras) {
+        let (Some(camera), Some(calibration)) = (camera, &view.calibration) else { continue };
+        let Ok(Some(header)) = store.header(view.id) else { continue };
+        let of_map = calibration.camera_at(Size::new(header.width, header.height));
+        let is_other = of_map.size() != camera.size();
+        if is_other && matches!(store.existing(view.id, &of_map), Existing::Usable) {
+            *camera = of_map;
+            other += 1;
+        }
+    }
+    if other > 0 {
+        progress.info(format!(
+            "{}: {other} depth maps are of another size than the options about resolution say; they are fused at their size",
+            folder.display()
+        ));
+    }
 }
 
 /// What a report says of a depth map that was written.
@@ -133,7 +167,11 @@ fn finish_depth_maps(
         elapsed: clock.elapsed(),
     });
     if job.outputs.sparse_cloud && !tracks.is_empty() {
-        let outputs = job.outputs.without_labels();
+        let mut outputs = job.outputs.without_labels();
+        if outputs.layout == PlyLayout::Odm {
+            // Sparse points need not have what it takes.
+            outputs.layout = PlyLayout::OpenMvsProject;
+        }
         let written = write_cloud(&outputs, &SparseCloud(tracks), None, progress)?;
         report.outputs.extend(cloud_rows(&written, None));
     }
@@ -169,7 +207,7 @@ pub(super) fn write_results(
     progress: &Progress,
     report: &mut RunReport,
 ) -> Result<()> {
-    if fused.cloud.is_empty() {
+    if fused.cloud.is_empty() && !outputs.allow_empty {
         return Err(Error::invalid(format!(
             "no point is seen alike by {} views, and nothing is written: are the images and poses right?{}",
             options.number_views_fuse,

@@ -9,6 +9,7 @@ use crate::progress::{Event, Progress, Stage};
 use crate::scene::{DepthEstimate, ImageId, ViewIndex};
 use crate::stereo::{self, CpuLevel, StereoOptions};
 use crate::store::depth_store::{DepthStore, Existing};
+use crate::store::memory;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -68,7 +69,7 @@ pub(super) fn existing_maps(
 
 impl Estimation<'_> {
     /// Leaves the final depth map of every view in the store: estimated, refined, and cleaned of speckles and gaps.
-    /// `existing` maps are only cleaned. Returns the views that have a map.
+    /// `existing` maps are not estimated again: they are refined if there are geometric passes, else only cleaned. Returns the views that have a map.
     ///
     /// # Errors
     /// An image cannot be read, a depth map cannot be written.
@@ -77,14 +78,35 @@ impl Estimation<'_> {
             self.prepared.matched_views().into_iter().filter(|v| !existing.contains(v)).collect();
         let passes = self.options.geometric_iterations as usize;
         let last = passes == 0;
+        self.require_memory(&todo)?;
         self.photometric(&todo, last)?;
-        for pass in 0..passes {
-            self.geometric(&todo, pass, pass + 1 == passes)?;
-        }
-        self.clean_existing(existing)?;
         let mut views: Vec<ViewIndex> = todo.into_iter().chain(existing.iter().copied()).collect();
         views.sort_unstable();
+        if passes == 0 {
+            self.clean_existing(existing)?;
+            return Ok(views);
+        }
+        let matched = |view: &ViewIndex| !self.prepared.neighbors[view.index()].matching().is_empty();
+        let refined: Vec<ViewIndex> = views.iter().copied().filter(matched).collect();
+        for pass in 0..passes {
+            self.geometric(&refined, pass, pass + 1 == passes)?;
+        }
         Ok(views)
+    }
+
+    /// Asks whether there is memory for the views that are worked on at a time: their images and planes, and no more, so
+    /// that nothing is refused that might work.
+    fn require_memory(&self, todo: &[ViewIndex]) -> Result<()> {
+        /// Depth, normal, confidence, and one copy while they change.
+        const PLANES: usize = 40;
+        let bytes_of = |view: &ViewIndex| -> Result<usize> {
+            let sources = self.prepared.neighbors[view.index()].matching().len();
+            Ok(self.prepared.camera(*view)?.size().area() * (size_of::<f32>() * (1 + sources) + PLANES))
+        };
+        let mut bytes = todo.iter().map(bytes_of).collect::<Result<Vec<usize>>>()?;
+        bytes.sort_unstable_by(|a, b| b.cmp(a));
+        let at_a_time = bytes.iter().take(rayon::current_num_threads()).sum::<usize>();
+        memory::require(at_a_time as u64, "estimating as many depth maps at a time as there are threads")
     }
 
     fn photometric(&self, todo: &[ViewIndex], last: bool) -> Result<()> {

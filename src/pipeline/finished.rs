@@ -1,7 +1,7 @@
 //! Work on the cloud that a scene already has: filter it by visibility, take its well-seen points, tell their scale.
 
 use super::job::{Outputs, SceneArchive, SceneJob};
-use super::outputs::{check_places, cloud_rows, summary, write_cloud};
+use super::outputs::{check_places, cloud_rows, summary, write_archive, write_cloud};
 use super::prepare::load;
 use super::record::with_threads;
 use crate::cloud_filter::{PointViews, point_scales, point_visibility, swap_removed};
@@ -11,10 +11,10 @@ use crate::progress::{Event, Progress};
 use crate::report::{OutputReport, RunReport};
 use crate::scene::{PointSource, View};
 use crate::store::atomic::check_writable;
-use crate::store::export::{write_interface, write_project};
 use crate::store::import::LoadedScene;
 use crate::store::stored_cloud::{StoredCloud, resaved_archive, stored_cameras, write_scaled};
 use nalgebra::Vector3;
+use semvs_formats::mvs;
 use std::path::Path;
 use std::time::Instant;
 
@@ -27,6 +27,8 @@ pub enum CloudWork {
     WellSeen(u32),
     /// Tell the size of a pixel at every point, times this factor.
     Scale(f32),
+    /// Write the cloud as it is, and a scene without points.
+    Export,
 }
 
 /// Work on the cloud that a scene already has.
@@ -53,7 +55,7 @@ fn run(job: &CloudJob, progress: &Progress) -> Result<RunReport> {
     check_places(&job.outputs.without_labels(), None)?;
     let loaded = load(&job.input, progress)?;
     let points = &loaded.archive.points;
-    if points.positions.is_empty() || points.views.is_empty() {
+    if job.work != CloudWork::Export && (points.positions.is_empty() || points.views.is_empty()) {
         return Err(Error::content(
             &loaded.path,
             "a cloud whose points know the views that see them is needed: densify with --archive-type 0 to 3, or give \
@@ -63,6 +65,10 @@ fn run(job: &CloudJob, progress: &Progress) -> Result<RunReport> {
     let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
     match job.work {
         CloudWork::Scale(factor) => scale(job, &loaded, factor, progress, &mut report)?,
+        CloudWork::Export => {
+            let all: Vec<u32> = (0..points.positions.len() as u32).collect();
+            keep(job, &loaded, &all, progress, &mut report)?;
+        }
         CloudWork::FilterByVisibility(limit) => {
             let visibility = point_visibility(point_views(&loaded), &stored_cameras(&loaded));
             keep(job, &loaded, &swap_removed(&visibility, limit), progress, &mut report)?;
@@ -93,7 +99,7 @@ fn keep(
     report: &mut RunReport,
 ) -> Result<()> {
     let all = loaded.archive.points.positions.len();
-    if order.is_empty() {
+    if order.is_empty() && job.work != CloudWork::Export {
         return Err(Error::content(
             &loaded.path,
             format!("none of its {all} points remains; nothing is written"),
@@ -108,7 +114,8 @@ fn keep(
     report.points = cloud.len();
     report.outputs.extend(cloud_rows(&written, None));
     if let Some(path) = &job.outputs.scene {
-        write_points(path, loaded, &cloud, job.outputs.archive, progress)?;
+        let points = if job.work == CloudWork::Export { mvs::PointCloud::default() } else { cloud.copied() };
+        write_points(path, loaded, points, job.outputs.archive, progress)?;
         report.outputs.extend(job.outputs.scene_row());
     }
     Ok(())
@@ -117,16 +124,13 @@ fn keep(
 fn write_points(
     path: &Path,
     loaded: &LoadedScene,
-    cloud: &StoredCloud<'_>,
+    points: mvs::PointCloud,
     archive: SceneArchive,
     progress: &Progress,
 ) -> Result<()> {
     let start = Instant::now();
-    let resaved = resaved_archive(loaded, cloud.copied(), matches!(archive, SceneArchive::Project(_)));
-    match archive {
-        SceneArchive::Interface => write_interface(path, &resaved)?,
-        SceneArchive::Project(kind) => write_project(path, &resaved, kind)?,
-    }
+    let resaved = resaved_archive(loaded, points, matches!(archive, SceneArchive::Project(_)));
+    write_archive(path, &resaved, archive)?;
     let scene = summary(&resaved, archive == SceneArchive::Interface);
     progress.event(Event::SceneSaved { path: path.to_owned(), scene, elapsed: start.elapsed() });
     Ok(())

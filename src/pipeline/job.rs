@@ -28,14 +28,16 @@ pub struct SceneJob {
     pub neighbors: NeighborOptions,
     /// Region of interest.
     pub roi: RoiJob,
-    /// Say it if the cameras climb a tower, for which OpenMVS would make up points.
-    pub look_for_tower: bool,
+    /// What to do when the cameras climb a tower; `None`: do not look for one.
+    pub tower: Option<TowerJob>,
     /// Masks, if they are used.
     pub masks: Option<MaskJob>,
     /// Labels, if they are used.
     pub labels: Option<LabelJob>,
     /// An image or a depth map that cannot be used is an error.
     pub strict: bool,
+    /// Reuse depth maps as OpenMVS does: those that exist are not estimated again, even where geometric passes follow.
+    pub like_openmvs: bool,
     /// Threads; 0 = all of the machine.
     pub max_threads: usize,
 }
@@ -49,6 +51,32 @@ pub struct RoiJob {
     pub border: f32,
     /// Drop points outside. Default true.
     pub crop: bool,
+}
+
+/// `--tower-mode`: cameras that climb a tower.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TowerJob {
+    /// What the made-up points are for.
+    pub work: TowerWork,
+    /// Take it for a tower without looking at the cameras.
+    pub unchecked: bool,
+    /// A line of cameras in any direction may be a tower; else only one that rises.
+    pub any_direction: bool,
+    /// The cloud of the tower.
+    pub cloud: PathBuf,
+}
+
+/// What the points of a tower are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TowerWork {
+    /// They replace the sparse points.
+    Replace,
+    /// They are added to the sparse points.
+    Append,
+    /// Neighbours are found from them.
+    Neighbors,
+    /// Neighbours are found from them, and they are added.
+    NeighborsAndAppend,
 }
 
 /// Pixels without depth.
@@ -181,6 +209,8 @@ pub struct Outputs {
     pub names_from_scene: bool,
     /// Write the sparse points as the cloud when only depth maps are wanted, as OpenMVS does.
     pub sparse_cloud: bool,
+    /// A cloud without points is no error: then the scene alone is written.
+    pub allow_empty: bool,
 }
 
 /// How a scene is written.
@@ -191,6 +221,8 @@ pub enum SceneArchive {
     Interface,
     /// Project archive with the dense points.
     Project(ArchiveKind),
+    /// The bare header of a project archive of an unknown kind, as OpenMVS leaves it.
+    Header(i32),
 }
 
 impl Outputs {
@@ -240,6 +272,12 @@ impl SceneJob {
 }
 
 impl DensifyJob {
+    /// Whether depth maps that exist are neither refined nor cleaned, as when parts of a scene are fused.
+    pub(super) fn only_fuses(&self) -> bool {
+        let FilterJob { speckles, gaps, across, .. } = &self.filter;
+        self.stereo.geometric_iterations == 0 && !speckles && !gaps && across.is_none()
+    }
+
     /// Checks all values that can be checked without files.
     ///
     /// # Errors

@@ -25,8 +25,9 @@ mod record;
 mod skip;
 mod sparse;
 mod split;
+mod tower;
 
-pub use actions::{export_neighbors, export_roi, import_roi};
+pub use actions::{export_neighbors, export_roi, import_roi, is_project, is_readable};
 pub use convert::{ConvertJob, convert};
 pub use densify::{DEPTH_MAP, densify};
 pub use evaluate::{EvaluateJob, evaluate};
@@ -38,6 +39,6 @@ pub use fuse::fuse;
 pub use import::{ImportDepthsJob, ImportSceneJob, import_depths, import_scene};
 pub use job::{
     AcrossViews, DensifyJob, DepthMapsJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob,
-    SceneArchive, SceneJob,
+    SceneArchive, SceneJob, TowerJob, TowerWork,
 };
 pub use split::{SplitJob, split_scene};

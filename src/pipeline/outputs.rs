@@ -14,15 +14,19 @@ use crate::store::atomic::check_writable;
 use crate::store::cloud::{CloudOptions, WrittenClouds, check_cloud_paths, write_clouds};
 use crate::store::depth_store::depth_map_name;
 use crate::store::export::{
-    interface_archive, project_archive, relocate_names, write_interface, write_project,
+    interface_archive, project_archive, relocate_names, write_interface, write_project, write_project_header,
 };
 use crate::store::import::LoadedScene;
+use crate::store::memory;
 use crate::store::paths::is_same_file;
 use semvs_formats::mvs;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Bytes of a point of a project archive in memory, at least: position, normal, colour, two views with weights.
+const POINT_BYTES: u64 = 12 + 12 + 3 + 8 + 2 * 8;
 
 /// Checks that everything can be written, creating missing folders.
 ///
@@ -120,20 +124,35 @@ pub(super) fn write_scene(
     let start = Instant::now();
     let Prepared { loaded, cameras, neighbors, .. } = prepared;
     let mut archive = match outputs.archive {
-        SceneArchive::Interface => interface_archive(loaded, cameras, neighbors),
-        SceneArchive::Project(_) => project_archive(loaded, cameras, neighbors, cloud)?,
+        SceneArchive::Interface | SceneArchive::Header(_) => interface_archive(loaded, cameras, neighbors),
+        SceneArchive::Project(_) => {
+            memory::require(
+                cloud.len() * POINT_BYTES,
+                "a project archive with the dense cloud (--archive-type)",
+            )?;
+            project_archive(loaded, cameras, neighbors, cloud)?
+        }
     };
     if outputs.names_from_scene {
         let folder = path.parent().unwrap_or(Path::new(""));
         relocate_names(&mut archive, &loaded.search.working_folder, folder);
     }
-    match outputs.archive {
-        SceneArchive::Interface => write_interface(path, &archive)?,
-        SceneArchive::Project(kind) => write_project(path, &archive, kind)?,
-    }
+    write_archive(path, &archive, outputs.archive)?;
     let scene = summary(&archive, outputs.archive == SceneArchive::Interface);
     progress.event(Event::SceneSaved { path: path.clone(), scene, elapsed: start.elapsed() });
     Ok(())
+}
+
+/// Writes `archive` in the form that `kind` says.
+///
+/// # Errors
+/// The file cannot be written.
+pub(super) fn write_archive(path: &Path, archive: &mvs::Scene, kind: SceneArchive) -> Result<()> {
+    match kind {
+        SceneArchive::Interface => write_interface(path, archive),
+        SceneArchive::Project(kind) => write_project(path, archive, kind),
+        SceneArchive::Header(kind) => write_project_header(path, kind),
+    }
 }
 
 /// What a written scene holds.

@@ -4,13 +4,13 @@ use super::images::Images;
 use super::job::SceneJob;
 use super::skip::{Labels, Masks};
 use super::sparse::{override_from_file, replace_points};
+use super::tower::use_tower;
 use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::progress::{Event, Progress, SceneSummary};
 use crate::scene::{
-    ImageId, NeighborOptions, Scene, ViewIndex, ViewNeighbors, estimate_roi, looks_like_tower,
-    select_neighbors,
+    ImageId, NeighborOptions, Scene, ViewIndex, ViewNeighbors, estimate_roi, select_neighbors,
 };
 use crate::store::import::{LoadedScene, load_scene};
 use semvs_formats::Limits;
@@ -86,14 +86,11 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     if scene.roi.is_none() {
         scene.roi = estimate_roi(scene, job.roi.estimate);
     }
-    if job.look_for_tower && looks_like_tower(scene) {
-        progress.warn(
-            "the cameras climb as around a tower: OpenMVS would make up points of a cylinder here (--tower-mode), which \
-             is not done",
-        );
+    if let Some(tower) = &job.tower {
+        use_tower(&mut loaded, tower, &job.neighbors, progress)?;
     }
     if let Some(path) = &job.view_neighbors_file {
-        override_from_file(scene, path)?;
+        override_from_file(&mut loaded.scene, path)?;
     }
     Ok(loaded)
 }

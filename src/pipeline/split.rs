@@ -1,7 +1,7 @@
 //! A scene with depth maps to scenes that can be fused one after the other.
 
 use super::job::{SceneArchive, SceneJob};
-use super::outputs::summary;
+use super::outputs::{summary, write_archive};
 use super::prepare::load;
 use super::record::with_threads;
 use crate::error::{Error, Result};
@@ -10,7 +10,7 @@ use crate::progress::{Event, Progress};
 use crate::scene::{ImageId, ViewIndex};
 use crate::store::atomic::check_writable;
 use crate::store::depth_store::{DepthStore, Existing};
-use crate::store::export::{restrict_archive, write_interface, write_project};
+use crate::store::export::restrict_archive;
 use crate::store::import::LoadedScene;
 use crate::store::stored_cloud::resaved_archive;
 use crate::sub_scenes::{Chunk, Sample, split};
@@ -158,10 +158,7 @@ fn write_part(
     }
     restrict_archive(&mut part, &chunk.views, &chunk.roi);
     let (images, points) = (part.images.len(), part.points.positions.len());
-    match archive {
-        SceneArchive::Interface => write_interface(path, &part)?,
-        SceneArchive::Project(kind) => write_project(path, &part, kind)?,
-    }
+    write_archive(path, &part, archive)?;
     progress.info(format!(
         "{}: {images} images, {points} points, area {:.0} (sub-scene)",
         path.display(),

@@ -15,6 +15,7 @@ mod roi_estimate;
 #[cfg(test)]
 pub(crate) mod synthetic;
 mod tower;
+mod tower_points;
 mod trws;
 
 pub use cloud::{CloudLayout, CloudPoint, PointCloud, PointSink, PointSource};
@@ -30,3 +31,4 @@ pub use resample::{area_color, gray_from_color, resize_gray, resize_nearest};
 pub use resolution::{ResolutionOptions, scaled_size};
 pub use roi_estimate::{RoiEstimation, estimate_roi};
 pub use tower::looks_like_tower;
+pub use tower_points::{TowerPoints, tower_points};

@@ -1,6 +1,6 @@
 //! From the scene back to a `.mvs` file.
 
-use super::atomic::AtomicFile;
+use super::atomic::{AtomicFile, write_file};
 use super::import::LoadedScene;
 use super::paths::{SearchPath, clean_name, name_relative_to};
 use crate::error::{Error, Result};
@@ -136,6 +136,20 @@ pub fn write_project(path: &Path, archive: &mvs::Scene, kind: mvs::ArchiveKind) 
     let mut file = AtomicFile::create(path)?;
     mvs::write_project(&mut file, archive, kind).map_err(|e| Error::writing(path, e))?;
     file.commit()
+}
+
+/// Writes the header of a project archive of a kind that does not exist, and nothing after it.
+///
+/// # Errors
+/// [`Error`] if the place cannot be written.
+pub fn write_project_header(path: &Path, kind: i32) -> Result<()> {
+    let mut whole = Vec::new();
+    let empty = mvs::Scene::default();
+    mvs::write_project(&mut whole, &empty, mvs::ArchiveKind::Binary).map_err(|e| Error::format(path, e))?;
+    // Magic, version, kind, reserved.
+    let mut header = whole.get(..20).unwrap_or_default().to_vec();
+    header[8..12].copy_from_slice(&kind.to_le_bytes());
+    write_file(path, &header)
 }
 
 /// Writes an interface archive of the newest version, whole or not at all.

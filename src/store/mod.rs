@@ -16,6 +16,7 @@ mod jpeg;
 mod label_png;
 pub mod labels;
 pub mod masks;
+pub mod memory;
 pub mod packed;
 pub mod paths;
 pub mod rasters;

@@ -34,6 +34,7 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
             report: None,
             names_from_scene: true,
             sparse_cloud: false,
+            allow_empty: false,
         },
     };
     crate::cli::print(&pipeline::convert(&job, progress)?.summary());

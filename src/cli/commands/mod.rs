@@ -126,6 +126,7 @@ fn outputs(typed: &LabelOutput, cloud: PathBuf, scene: Option<PathBuf>) -> Outpu
         report: typed.report.clone(),
         names_from_scene: true,
         sparse_cloud: false,
+        allow_empty: false,
     }
 }
 

@@ -18,7 +18,7 @@ pub(crate) struct DropInArgs {
     /// Kind of the .mvs written: -1 interface; 0 text, 1 binary, 2 zlib, 3 zstd project archive
     #[arg(long, value_name = "N", default_value_t = -1, allow_negative_numbers = true)]
     pub(crate) archive_type: i32,
-    /// Process priority, -3..3; accepted without effect
+    /// Process priority, -3 (lowest) to 3 (highest); below 0 leaves the machine usable
     #[arg(long, value_name = "N", default_value_t = -1, allow_negative_numbers = true)]
     pub(crate) process_priority: i32,
     /// 0 results only, 1 stages, 2 images, 3 everything
@@ -33,6 +33,12 @@ pub(crate) struct DropInArgs {
     /// Base name of the results; its extension is dropped [default: input file + "_dense"]
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output_file: Option<PathBuf>,
+    /// Keep what OpenMVS does wrong where a pipeline may depend on it; docs/COMPATIBILITY.md lists it
+    #[arg(long)]
+    pub(crate) strict_openmvs: bool,
+    /// As in OpenMVS 2.4: above 0 every point gets a class; the label maps are the images' masks
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub(crate) estimate_segmentation: i32,
     #[command(flatten)]
     pub(crate) actions: Actions,
     #[command(flatten)]
@@ -140,6 +146,8 @@ pub(crate) const BEYOND: &[&str] = &[
     "ply-layout",
     "filter",
     "strict",
+    "strict-openmvs",
+    "estimate-segmentation",
 ];
 
 /// All options for the tokenizer.
@@ -149,9 +157,11 @@ pub(crate) fn known() -> Vec<Known> {
         .get_arguments()
         .filter_map(|arg| {
             let long = arg.get_long()?;
+            // OpenMVS 2.4's short name.
+            let short = arg.get_short().or_else(|| (long == "mask-path").then_some('m'));
             Some(Known {
                 long: long.to_owned(),
-                short: arg.get_short(),
+                short,
                 takes_value: arg.get_action().takes_values(),
                 openmvs: !BEYOND.contains(&long),
             })

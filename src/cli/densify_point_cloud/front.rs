@@ -4,6 +4,7 @@ use super::args::{self, DropInArgs};
 use super::config_file;
 use super::tokens::{self, Typed};
 use crate::cli::commands::effective::options_in_effect;
+use crate::cli::label_options::ConsistencyMode;
 use crate::cli::one_line::one_line;
 use crate::cli::values::{openmvs_path, under};
 use clap::{CommandFactory, FromArgMatches};
@@ -47,9 +48,30 @@ pub(crate) fn read(words: &[OsString]) -> Result<Typing, String> {
     }
     let matches = DropInArgs::command().try_get_matches_from(canonical(&typed));
     let matches = matches.map_err(|error| one_line(&error))?;
-    let args = DropInArgs::from_arg_matches(&matches).map_err(|error| one_line(&error))?;
+    let mut args = DropInArgs::from_arg_matches(&matches).map_err(|error| one_line(&error))?;
+    map_segmentation(&mut args);
     let options = options_in_effect::<DropInArgs>(&matches);
     Ok(Typing { args, given: typed.into_iter().map(|(name, _)| name).collect(), options })
+}
+
+/// OpenMVS 2.4's `--estimate-segmentation` in terms of labels: the label maps are those of the mask folder, else the masks
+/// that the scene names or that lie beside the images; points are labelled, fusion is not changed. Options about labels
+/// that are given go first.
+fn map_segmentation(args: &mut DropInArgs) {
+    /// The classes that OpenMVS 2.4 knows.
+    const CLASSES: &str = "openmvs-aerial";
+    if args.estimate_segmentation <= 0 {
+        return;
+    }
+    let labels = &mut args.shared.labels.input;
+    if labels.label_path.is_none() {
+        labels.label_path = args.shared.images.mask_path.as_deref().map(openmvs_path);
+    }
+    let has_classes = labels.label_path.as_ref().is_some_and(|folder| folder.join("labels.json").is_file());
+    if labels.class_table.is_none() && !has_classes {
+        labels.class_table = Some(CLASSES.to_owned());
+    }
+    labels.label_consistency.get_or_insert(ConsistencyMode::Off);
 }
 
 /// `--name=value` words for the typed parser.

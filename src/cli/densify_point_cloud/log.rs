@@ -48,6 +48,15 @@ impl Log {
         }
     }
 
+    /// The largest and the present size of the process, where the system tells.
+    pub(crate) fn memory(&self) {
+        let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return };
+        self.line(0, "MEMORYINFO: {");
+        let sizes = status.lines().filter(|l| l.starts_with("VmPeak:") || l.starts_with("VmSize:"));
+        sizes.for_each(|line| self.line(0, &format!("\t{line}")));
+        self.line(0, "} ENDINFO");
+    }
+
     /// What ended the run.
     pub(crate) fn error(&self, text: &str) {
         self.important(&format!("error: {}", printable(text)));

@@ -6,6 +6,7 @@ mod config_file;
 mod front;
 mod help;
 mod log;
+mod priority;
 mod refusals;
 mod run;
 mod tokens;

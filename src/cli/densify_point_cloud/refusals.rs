@@ -10,7 +10,7 @@ pub(crate) fn check(args: &DropInArgs) -> Result<(), String> {
     let actions = &args.actions;
     let refusals = [
         (
-            !(-1..=3).contains(&args.archive_type),
+            !(-1..=3).contains(&args.archive_type) && !args.strict_openmvs,
             "--archive-type",
             "give -1 (interface), 0 (text), 1 (binary), 2 (zlib) or 3 (zstd)",
         ),

@@ -1,10 +1,12 @@
 //! One run of `DensifyPointCloud`, from the command line to the exit code.
 
+use super::args::DropInArgs;
 use super::front::{self, Typing};
 use super::log::Log;
-use super::{actions, help, refusals};
+use super::{actions, help, priority, refusals};
 use crate::cli::commands::{effective, write_report};
 use crate::cli::duration;
+use crate::cli::exit_code;
 use crate::cli::listen::Recorder;
 use crate::cli::one_line::printable;
 use crate::cli::options::FilterKind;
@@ -21,6 +23,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Runs `DensifyPointCloud` with the words of its command line, the program's name left out. Lines go to stdout and
 /// to a log file in the working folder; an error goes to stderr too unless stdout is a terminal. Every failure is
@@ -47,10 +50,21 @@ pub fn densify_point_cloud(words: impl IntoIterator<Item = OsString>) -> ExitCod
             return ExitCode::FAILURE;
         }
     }
+    // The default of OpenMVS, a low one, is not set unless it is typed.
+    let wanted = typing.has("process-priority").then_some(typing.args.process_priority);
+    if let Some(Err(why)) = wanted.map(priority::set) {
+        log.line(1, &format!("--process-priority {}: not set: {why}", typing.args.process_priority));
+    }
     let recorder = Recorder::start(log.clone());
     match run(&typing, &folder, &log, &recorder) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => fail(Some(&log), &error.to_string()),
+        Ok(()) => {
+            log.memory();
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            fail(Some(&log), &error.to_string());
+            exit_code(&error)
+        }
     }
 }
 
@@ -82,7 +96,15 @@ fn run(typing: &Typing, folder: &Path, log: &Log, recorder: &Arc<Recorder>) -> R
     if actions::act(typing, folder, &job, &progress)? {
         return Ok(());
     }
-    let mut report = pipeline::densify(&job, resolve::cpu()?, &progress)?;
+    let start = Instant::now();
+    let mut report = match pipeline::densify(&job, resolve::cpu()?, &progress) {
+        Err(error) if args.strict_openmvs && job.depth_maps_only && pipeline::is_readable(&job.input) => {
+            log.error(&error.to_string());
+            log.line(0, &format!("Depth-maps estimated ({})", duration::text(start.elapsed())));
+            return Ok(());
+        }
+        result => result?,
+    };
     report.warnings = recorder.warnings();
     conclude(report, &job, typing, log)
 }
@@ -110,24 +132,19 @@ fn existing_input(folder: &Path, typed: &Path) -> Result<PathBuf> {
 fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) -> Result<DensifyJob> {
     let args = &typing.args;
     let shared = &args.shared;
-    let base = match &args.output_file {
-        Some(output) => front::resolve(folder, output).with_extension(""),
-        None => with_suffix(&input.with_extension(""), "_dense"),
-    };
-    if base.file_name().is_none() {
-        return Err(Error::content(&base, "--output-file: give a file name"));
-    }
-    let (archive, layout) = match usize::try_from(args.archive_type).ok() {
-        Some(kind) => match ArchiveKind::ALL.get(kind) {
-            Some(&kind) => (SceneArchive::Project(kind), PlyLayout::OpenMvsProject),
-            None => return Err(Error::invalid(format!("--archive-type {kind}: give -1 to 3"))),
-        },
-        None => (SceneArchive::Interface, PlyLayout::OpenMvs),
-    };
+    let strict = args.strict_openmvs;
+    let base = output_base(args, folder, &input)?;
+    let (archive, layout) = archive(args)?;
     let mut scene = resolver.scene(input, folder.to_owned())?;
     if let Some(masks) = &mut scene.masks {
         // Unlike all others this path is relative to the current folder.
         masks.folder = shared.images.mask_path.as_deref().map(openmvs_path);
+    }
+    if strict {
+        (scene.strict, scene.like_openmvs) = (true, true);
+        if let Some(tower) = &mut scene.tower {
+            (tower.any_direction, tower.cloud) = (true, PathBuf::from("tower.ply"));
+        }
     }
     let outputs = &shared.labels.output;
     Ok(DensifyJob {
@@ -135,7 +152,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() },
         stereo: resolver.stereo()?,
-        filter: resolver.filter(typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
+        filter: resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
         depth_maps_only: shared.estimation.fusion_mode == 1,
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion()?,
@@ -149,8 +166,40 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
             report: outputs.report.as_deref().map(|path| under(folder, &openmvs_path(path))),
             names_from_scene: false,
             sparse_cloud: true,
+            allow_empty: strict,
         },
     })
+}
+
+/// The results' path without extension.
+fn output_base(args: &DropInArgs, folder: &Path, input: &Path) -> Result<PathBuf> {
+    let base = match &args.output_file {
+        Some(output) if args.strict_openmvs => {
+            let path = front::resolve(folder, output);
+            // A dot in the name of a folder ends the name too.
+            let text = path.to_string_lossy();
+            PathBuf::from(text.rsplit_once('.').map_or(&*text, |(base, _)| base))
+        }
+        Some(output) => front::resolve(folder, output).with_extension(""),
+        None => with_suffix(&input.with_extension(""), "_dense"),
+    };
+    match base.file_name() {
+        None => Err(Error::content(&base, "--output-file: give a file name")),
+        Some(_) => Ok(base),
+    }
+}
+
+/// What the scene is written as, and the columns of a cloud beside it.
+fn archive(args: &DropInArgs) -> Result<(SceneArchive, PlyLayout)> {
+    let kind = args.archive_type;
+    if kind == -1 {
+        return Ok((SceneArchive::Interface, PlyLayout::OpenMvs));
+    }
+    match usize::try_from(kind).ok().and_then(|kind| ArchiveKind::ALL.get(kind)) {
+        Some(&kind) => Ok((SceneArchive::Project(kind), PlyLayout::OpenMvsProject)),
+        None if args.strict_openmvs => Ok((SceneArchive::Header(kind), PlyLayout::OpenMvsProject)),
+        None => Err(Error::invalid(format!("--archive-type {kind}: give -1 to 3"))),
+    }
 }
 
 fn conclude(mut report: RunReport, job: &DensifyJob, typing: &Typing, log: &Log) -> Result<()> {
