@@ -169,7 +169,7 @@ fn regions_and_neighbours_become_text() {
     let mut scene = file(&scratch, "scene.mvs");
     let rotation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     let obb = semvs_formats::mvs::Obb { rotation, center: [1.0, 2.0, 3.0], half_extent: [4.0, 5.0, 6.0] };
-    scene.scene.obb = Some(obb.clone());
+    scene.scene.obb = Some(obb);
     let mut bytes = Vec::new();
     semvs_formats::mvs::write_interface(&mut bytes, &scene.scene, 7).unwrap();
     scratch.write("boxed.mvs", bytes);
