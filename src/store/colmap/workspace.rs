@@ -130,10 +130,15 @@ mod tests {
         let inner = Workspace::at(&facade().join("sparse"), None).unwrap();
         assert_eq!(inner.sparse, facade().join("sparse"));
         assert_eq!(inner.images, facade().join("images"));
-        let binary = Workspace::at(&facade().join("colmap-4.2/binary"), None).unwrap_err();
-        assert!(binary.to_string().contains("no images/ folder"), "{binary}");
-        let images = facade().join("images");
-        assert!(Workspace::at(&facade().join("colmap-4.2/binary"), Some(&images)).is_ok());
+        let two_up = Workspace::at(&facade().join("colmap-4.2/binary"), None).unwrap();
+        assert_eq!(two_up.images, facade().join("images"), "as above sparse/0");
+        let scratch = tempfile::tempdir().unwrap();
+        for name in ["cameras.bin", "images.bin", "points3D.bin"] {
+            std::fs::copy(two_up.sparse.join(name), scratch.path().join(name)).unwrap();
+        }
+        let alone = Workspace::at(scratch.path(), None).unwrap_err().to_string();
+        assert!(alone.contains("no images/ folder"), "{alone}");
+        assert!(Workspace::at(scratch.path(), Some(&facade().join("images"))).is_ok());
         let nothing = Workspace::at(&facade().join("labels"), None).unwrap_err();
         assert!(nothing.to_string().contains("no COLMAP workspace"), "{nothing}");
     }
