@@ -171,8 +171,15 @@ mod tests {
     use super::*;
     use crate::scene::synthetic;
 
+    struct Wall {
+        positions: Vec<[f32; 3]>,
+        offsets: Vec<u64>,
+        views: Vec<u32>,
+        cameras: Vec<Option<Camera>>,
+    }
+
     /// A cloud of a wall with holes in front and stray points, seen by three cameras.
-    fn wall() -> (Vec<[f32; 3]>, Vec<u64>, Vec<u32>, Vec<Option<Camera>>) {
+    fn wall() -> Wall {
         let mut state = 7u32;
         let mut random = move || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -192,7 +199,7 @@ mod tests {
         let cameras = (0..3).map(|i| {
             Some(synthetic::camera(80, 60, [f64::from(i) - 1.0, 0.0, 0.0], 0.05 * (f64::from(i) - 1.0)))
         });
-        (positions, offsets, views, cameras.collect())
+        Wall { positions, offsets, views, cameras: cameras.collect() }
     }
 
     /// The definition, pair by pair.
@@ -224,7 +231,7 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_all_pairs() {
-        let (positions, offsets, views, mut cameras) = wall();
+        let Wall { positions, offsets, views, mut cameras } = wall();
         for without in [None, Some(1)] {
             if let Some(view) = without {
                 cameras[view] = None;
@@ -238,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_order_of_points_does_not_matter() {
-        let (positions, offsets, views, cameras) = wall();
+        let Wall { positions, offsets, views, cameras } = wall();
         let cloud = PointViews { positions: &positions, offsets: &offsets, views: &views };
         let straight = point_visibility(cloud, &cameras);
         let (mut turned, mut turned_offsets, mut turned_views) = (Vec::new(), vec![0u64], Vec::new());

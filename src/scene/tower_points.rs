@@ -32,6 +32,13 @@ pub struct TowerPoints {
     pub normals: Vec<[f32; 3]>,
 }
 
+/// A point and the views that see it from outside.
+struct TowerPoint {
+    position: [f32; 3],
+    normal: [f32; 3],
+    views: Vec<ViewIndex>,
+}
+
 /// Makes points on circles about the vertical through the middle of the cameras, from 5 units below the lowest camera (or
 /// the lowest sparse point) up to the highest camera or point. A circle's radius is that of the sparse points at its
 /// height, else a third of the cameras' distance less one unit. Points that fewer than two views see from outside are left
@@ -50,7 +57,7 @@ pub fn tower_points(scene: &Scene) -> Option<TowerPoints> {
     if radii.is_empty() || !total.is_finite() || total > MAX_POINTS {
         return None;
     }
-    let circles: Vec<Vec<([f32; 3], [f32; 3], Vec<ViewIndex>)>> = radii
+    let circles: Vec<Vec<TowerPoint>> = radii
         .par_iter()
         .enumerate()
         .map(|(i, &radius)| {
@@ -62,15 +69,15 @@ pub fn tower_points(scene: &Scene) -> Option<TowerPoints> {
                 let position = [axis.center[0] + radius * c, axis.center[1] + radius * s, z];
                 let normal = [c, s, 0.0];
                 let views = seen_from_outside(position, normal, &cameras);
-                (views.len() >= 2).then_some((position, normal, views))
+                (views.len() >= 2).then_some(TowerPoint { position, normal, views })
             };
             (0..count).filter_map(point).collect()
         })
         .collect();
     let mut points = TowerPoints::default();
-    for (position, normal, views) in circles.into_iter().flatten() {
-        points.tracks.push(position, views);
-        points.normals.push(normal);
+    for point in circles.into_iter().flatten() {
+        points.tracks.push(point.position, point.views);
+        points.normals.push(point.normal);
     }
     Some(points)
 }
