@@ -1,5 +1,6 @@
 //! View-neighbour text files: which images an image is to be matched with.
 
+use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;
 
@@ -51,12 +52,25 @@ pub fn parse(text: &[u8], images: usize) -> Result<NeighborsFile> {
             parse_line(line, offset, &format!("line {}", number + 1), images, &mut file)?;
         }
         offset += line.len() as u64;
+        if file.lists.len() / 2 > images {
+            keep_last(&mut file.lists);
+        }
     }
+    keep_last(&mut file.lists);
     Ok(file)
 }
 
+/// Of several lists of an image keeps the last.
+fn keep_last(lists: &mut Vec<NeighborList>) {
+    let mut seen = HashSet::new();
+    lists.reverse();
+    lists.retain(|list| seen.insert(list.image));
+    lists.reverse();
+}
+
 fn parse_line(line: &[u8], offset: u64, place: &str, images: usize, file: &mut NeighborsFile) -> Result<()> {
-    let mut indices = Vec::new();
+    let (mut named, mut words_seen) = (None, 0);
+    let (mut seen, mut neighbors) = (HashSet::new(), Vec::new());
     for word in words(line, offset) {
         let index: u32 = word.number(place, "the index of an image")?;
         if index as usize >= images {
@@ -64,19 +78,16 @@ fn parse_line(line: &[u8], offset: u64, place: &str, images: usize, file: &mut N
                 word.error(place, format!("index {index} is out of range, there are {images} images"))
             );
         }
-        indices.push(index);
+        words_seen += 1;
+        if seen.insert(index) && *named.get_or_insert(index) != index {
+            neighbors.push(index);
+        }
     }
-    let Some((&image, rest)) = indices.split_first() else { return Ok(()) };
-    if rest.is_empty() {
-        file.alone.push(image);
-        return Ok(());
+    match named {
+        None => {}
+        Some(image) if words_seen == 1 => file.alone.push(image),
+        Some(image) => file.lists.push(NeighborList { image, neighbors }),
     }
-    let mut seen = vec![false; images];
-    seen[image as usize] = true;
-    let neighbors =
-        rest.iter().copied().filter(|&i| !std::mem::replace(&mut seen[i as usize], true)).collect();
-    file.lists.retain(|list| list.image != image);
-    file.lists.push(NeighborList { image, neighbors });
     Ok(())
 }
 

@@ -66,7 +66,7 @@ pub fn read(source: impl Read, length: Option<u64>, limits: &Limits) -> Result<F
     if !r.at_end()? {
         return Err(r.error(&at, format!("bytes follow the {count} values of shape {shape:?}")));
     }
-    if !fortran_order || shape.len() < 2 {
+    if !fortran_order || shape.len() < 2 || data.is_empty() {
         return Ok(FloatArray { shape, data });
     }
     r.charge(count.saturating_mul(4), &at)?;

@@ -5,10 +5,20 @@ use super::model::{
     SensorKind, TrackElement,
 };
 use super::workspace::ModelFile;
-use crate::source::Source;
+use crate::source::{Source, grow};
 use crate::{Error, Limits, Result};
 use std::io::Read;
 use std::str::FromStr;
+
+/// Longest line, in bytes: that of an image with about a million observations.
+const MAX_LINE: u64 = 16 << 20;
+/// Bytes of values that a file may have however small it is.
+const FREE_VALUES: u64 = 8 << 20;
+/// Bytes of values for each two bytes of the file beyond that. Real files have less than one for one.
+const MOST_VALUES: u64 = 5;
+
+/// Bytes of the values of a point without its track.
+const BYTES_PER_POINT: usize = 8 + 24 + 3 + 8 + 8;
 
 /// Reads one file into its part of `model`.
 pub(super) fn read_file(
@@ -22,40 +32,56 @@ pub(super) fn read_file(
         ModelFile::Cameras => {
             model.cameras.clear();
             while let Some(mut line) = lines.next_entry()? {
-                model.cameras.push(camera(&mut line)?);
+                let camera = camera(&mut line)?;
+                lines.charge(size_of::<Camera>() + 8 * camera.params.len())?;
+                append(&mut model.cameras, camera);
             }
         }
         ModelFile::Images => {
             model.images.clear();
             while let Some(mut line) = lines.next_entry()? {
                 let mut image = image(&mut line)?;
+                let name = image.name.len();
                 // the line after an image is its observations, be it empty
                 if let Some(mut line) = lines.next_line()? {
                     observations(&mut line, &mut image.observations)?;
                 }
-                model.images.push(image);
+                lines.charge(size_of::<Image>() + name + size_of_val(image.observations.as_slice()))?;
+                append(&mut model.images, image);
             }
         }
         ModelFile::Points => {
             model.points = Default::default();
             while let Some(mut line) = lines.next_entry()? {
+                let before = model.points.tracks.len();
                 point(&mut line, model)?;
+                let elements = model.points.tracks.len() - before;
+                lines.charge(BYTES_PER_POINT + elements * size_of::<TrackElement>())?;
             }
         }
         ModelFile::Rigs => {
             model.rigs.clear();
             while let Some(mut line) = lines.next_entry()? {
-                model.rigs.push(rig(&mut line)?);
+                let rig = rig(&mut line)?;
+                lines.charge(size_of::<Rig>() + size_of_val(rig.others.as_slice()))?;
+                append(&mut model.rigs, rig);
             }
         }
         ModelFile::Frames => {
             model.frames.clear();
             while let Some(mut line) = lines.next_entry()? {
-                model.frames.push(frame(&mut line)?);
+                let frame = frame(&mut line)?;
+                lines.charge(size_of::<Frame>() + size_of_val(frame.data.as_slice()))?;
+                append(&mut model.frames, frame);
             }
         }
     }
     Ok(())
+}
+
+fn append<T>(out: &mut Vec<T>, element: T) {
+    grow(out, 1);
+    out.push(element);
 }
 
 fn camera(line: &mut Line<'_>) -> Result<Camera> {
@@ -89,7 +115,7 @@ fn observations(line: &mut Line<'_>, out: &mut Vec<Observation>) -> Result<()> {
             "-1" => NO_POINT,
             id => id.parse().map_err(|_| line.bad("POINT3D_ID", id))?,
         };
-        out.push(Observation { position, point_id });
+        append(out, Observation { position, point_id });
     }
     Ok(())
 }
@@ -103,13 +129,13 @@ fn point(line: &mut Line<'_>, model: &mut Model) -> Result<()> {
     while !line.is_empty() {
         let element =
             TrackElement { image_id: line.number("IMAGE_ID")?, observation: line.number("POINT2D_IDX")? };
-        points.tracks.push(element);
+        append(&mut points.tracks, element);
     }
-    points.ids.push(id);
-    points.positions.push(position);
-    points.colors.push(color);
-    points.errors.push(error);
-    points.track_ends.push(points.tracks.len() as u64);
+    append(&mut points.ids, id);
+    append(&mut points.positions, position);
+    append(&mut points.colors, color);
+    append(&mut points.errors, error);
+    append(&mut points.track_ends, points.tracks.len() as u64);
     Ok(())
 }
 
@@ -122,7 +148,7 @@ fn rig(line: &mut Line<'_>) -> Result<Rig> {
     for _ in 1..sensors {
         let sensor = line.sensor()?;
         let pose = if line.number::<u8>("HAS_POSE")? != 0 { Some(line.pose()?) } else { None };
-        rig.others.push(RigSensor { sensor, pose });
+        append(&mut rig.others, RigSensor { sensor, pose });
     }
     line.end()?;
     Ok(rig)
@@ -134,7 +160,7 @@ fn frame(line: &mut Line<'_>) -> Result<Frame> {
     let count: u32 = line.number("NUM_DATA_IDS")?;
     let mut data = Vec::new();
     for _ in 0..count {
-        data.push(FrameData { sensor: line.sensor()?, data_id: line.number("DATA_ID")? });
+        append(&mut data, FrameData { sensor: line.sensor()?, data_id: line.number("DATA_ID")? });
     }
     line.end()?;
     Ok(Frame { id, rig_id, pose, data })
@@ -147,12 +173,24 @@ struct Lines<R> {
     stem: &'static str,
     number: u64,
     limit: u64,
+    values: u64,
 }
 
 impl<R: Read> Lines<R> {
     fn new(source: R, stem: &'static str, limits: &Limits) -> Self {
         let (source, buffer) = (Source::new(source), Vec::new());
-        Lines { source, buffer, stem, number: 0, limit: limits.max_bytes }
+        Lines { source, buffer, stem, number: 0, limit: limits.max_bytes, values: 0 }
+    }
+
+    /// Accounts for values that were read.
+    fn charge(&mut self, bytes: usize) -> Result<()> {
+        self.values += bytes as u64;
+        let limit = (self.source.offset() / 2).saturating_mul(MOST_VALUES).saturating_add(FREE_VALUES);
+        if self.values > limit.min(self.limit) {
+            let (needed, limit) = (self.values, limit.min(self.limit));
+            return Err(Error::Limits { field: self.stem.to_owned(), needed, limit });
+        }
+        Ok(())
     }
 
     /// The next line, `None` at the end.
@@ -163,7 +201,8 @@ impl<R: Read> Lines<R> {
             let (field, limit) = (self.stem.to_owned(), self.limit);
             return Err(Error::Limits { field, needed: offset, limit });
         }
-        let ended = !self.source.line(&mut self.buffer, self.limit, self.stem)? && self.buffer.is_empty();
+        let ended = !self.source.line(&mut self.buffer, self.limit.min(MAX_LINE), self.stem)?
+            && self.buffer.is_empty();
         self.number += 1;
         let line = Line { rest: &self.buffer, stem: self.stem, number: self.number, offset };
         Ok((!ended).then_some(line))

@@ -73,7 +73,8 @@ fn list<R: Read, T>(
     let mut out = Vec::new();
     r.room(&mut out, count, place)?;
     for i in 0..count {
-        out.push(element(r, &place.item(i))?);
+        let value = element(r, &place.item(i))?;
+        r.push(&mut out, value, place)?;
     }
     Ok(out)
 }
@@ -172,7 +173,8 @@ fn read_points<R: Read>(r: &mut Reader<R>) -> Result<PointCloud> {
         let at = at.field("views");
         let n = r.u64(&at)?;
         let n = r.check_count(n, 8, &at)?;
-        r.charge(8 * n as u64, &at)?;
+        r.grow(&mut views.images, n, &at)?;
+        r.grow(&mut views.weights, n, &at)?;
         r.for_each(n, &at, |&[a, b, c, d, e, f, g, h]| {
             views.images.push(u32::from_le_bytes([a, b, c, d]));
             views.weights.push(f32::from_le_bytes([e, f, g, h]));

@@ -6,6 +6,8 @@ use std::io::Read;
 
 /// Longest header accepted, in bytes; real ones take a few kilobytes at most.
 const MAX_HEADER: u64 = 4 << 20;
+/// Most elements of a file, and most properties of an element; real files have a dozen or two.
+const MAX_COLUMNS: usize = 1024;
 
 /// How the values after the header are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -234,6 +236,9 @@ impl Parser {
                 let Ok(count) = count.parse() else {
                     return Err(broken(offset, field, format!("\"{}\" is not a count", excerpt(count))));
                 };
+                if self.elements.len() == MAX_COLUMNS {
+                    return Err(broken(offset, field, format!("more than {MAX_COLUMNS} elements")));
+                }
                 self.elements.push(Element { name: (*name).to_owned(), count, properties: Vec::new() });
             }
             ("property", ["list", count, item, name]) => {
@@ -255,6 +260,9 @@ impl Parser {
         };
         if element.properties.iter().any(|p| p.name == name) {
             return Err(broken(&format!("declared twice in element {}", excerpt(&element.name))));
+        }
+        if element.properties.len() == MAX_COLUMNS {
+            return Err(broken(&format!("more than {MAX_COLUMNS} properties of an element")));
         }
         if let PropertyType::List { count, .. } = kind
             && !count.is_integer()

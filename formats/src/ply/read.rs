@@ -4,14 +4,20 @@ use super::ascii::pack_line;
 use super::cloud::Cloud;
 use super::header::{Element, Encoding, Header, PropertyType, ScalarType, broken};
 use super::record::{Block, Place, RecordLayout};
-use crate::source::Source;
+use crate::source::{Source, grow};
 use crate::{Error, Limits, Result};
 use std::io::Read;
 
 /// Points decoded at a time.
 const CHUNK: usize = 8192;
-/// Longest text line of one point, in bytes.
-const MAX_LINE: u64 = 16 << 20;
+/// Longest record of one point, as bytes or as a text line.
+const MAX_RECORD: u64 = 4 << 20;
+/// Packed bytes of text lines after which they are decoded.
+const MAX_PACKED: usize = 1 << 20;
+/// Bytes of values that a cloud may have however small its file is.
+const FREE_VALUES: u64 = 16 << 20;
+/// Bytes of values for each byte of the file beyond that; only 8-bit coordinates take more.
+const MOST_VALUES: u64 = 3;
 
 /// Reads a whole cloud.
 ///
@@ -127,6 +133,7 @@ impl<R: Read> PointReader<R> {
                 None if found.records > 0 => break,
                 None => {
                     self.check_limit(self.source.window().len() as u64)?;
+                    check_record(&self.source, &self.element)?;
                     if !self.source.fill()? {
                         return Err(self.ended());
                     }
@@ -141,9 +148,9 @@ impl<R: Read> PointReader<R> {
         self.packed.clear();
         let mut line = Vec::new();
         let mut found = Found { records: 0, bytes: 0 };
-        while found.records < n {
+        while found.records < n && self.packed.len() < MAX_PACKED {
             let offset = self.source.offset();
-            if !self.source.line(&mut line, MAX_LINE, "vertex")? && line.is_empty() {
+            if !self.source.line(&mut line, MAX_RECORD, "vertex")? && line.is_empty() {
                 return Err(self.ended());
             }
             if line.iter().all(u8::is_ascii_whitespace) {
@@ -162,13 +169,24 @@ impl<R: Read> PointReader<R> {
         broken(self.source.offset(), "vertex", what)
     }
 
+    /// Refuses values that take more than the limits allow, or far more than the bytes that they were read from.
     fn check_limit(&self, needed: u64) -> Result<()> {
-        let limit = self.limits.max_bytes;
+        let sound = self.source.offset().saturating_mul(MOST_VALUES).saturating_add(FREE_VALUES);
+        let limit = self.limits.max_bytes.min(sound);
         if needed > limit {
             return Err(Error::Limits { field: "vertex".into(), needed, limit });
         }
         Ok(())
     }
+}
+
+/// Refuses a record that does not end within the window, if that is long.
+fn check_record<R: Read>(source: &Source<R>, element: &Element) -> Result<()> {
+    let (needed, limit) = (source.window().len() as u64, MAX_RECORD);
+    if needed >= limit {
+        return Err(Error::Limits { field: format!("a record of element {}", element.name), needed, limit });
+    }
+    Ok(())
 }
 
 /// Complete records at the start of a window.
@@ -191,7 +209,7 @@ fn skip<R: Read>(source: &mut Source<R>, element: &Element, encoding: Encoding) 
     for _ in 0..element.count {
         if encoding == Encoding::Ascii {
             while line.iter().all(u8::is_ascii_whitespace) {
-                if !source.line(&mut line, MAX_LINE, &element.name)? && line.is_empty() {
+                if !source.line(&mut line, MAX_RECORD, &element.name)? && line.is_empty() {
                     return Err(ended(source));
                 }
             }
@@ -203,6 +221,7 @@ fn skip<R: Read>(source: &mut Source<R>, element: &Element, encoding: Encoding) 
             let big_endian = encoding == Encoding::BigEndian;
             match layout.walk(source.window(), 0, big_endian, source.offset(), &mut anchors)? {
                 Some(bytes) => break bytes,
+                None if check_record(source, element).is_err() => return check_record(source, element),
                 None if source.fill()? => {}
                 None => return Err(ended(source)),
             }
@@ -285,6 +304,7 @@ impl Columns {
         ];
         for (place, column) in floats {
             if let Some(place) = place {
+                grow(column, block.len());
                 block.scalars(place, |v| column.push(v as f32));
             }
         }
@@ -292,6 +312,11 @@ impl Columns {
             [(self.label, f64::from(u16::MAX), "label"), (self.view_count, f64::from(u32::MAX), "views")];
         for (place, max, name) in integers {
             let Some(place) = place else { continue };
+            if name == "label" {
+                grow(&mut cloud.labels, block.len());
+            } else {
+                grow(&mut cloud.view_counts, block.len());
+            }
             let mut index = 0;
             let mut bad = None;
             block.scalars(place, |v| {
@@ -319,6 +344,7 @@ impl Columns {
         if lists.offsets.is_empty() {
             lists.offsets.push(0);
         }
+        grow(&mut lists.offsets, block.len());
         for index in 0..block.len() {
             let field = |name| format!("vertex[{}].{name}", first + index as u64);
             let count = block.list(index, views, &mut lists.images, |v| v as u32);
@@ -355,6 +381,7 @@ fn triples<T: Copy>(
     convert: impl Fn(f64) -> T,
 ) {
     let first = out.len();
+    grow(out, block.len());
     out.resize(first + block.len(), [zero; 3]);
     for (component, place) in places.into_iter().enumerate() {
         let mut rows = out[first..].iter_mut();

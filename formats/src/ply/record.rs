@@ -2,6 +2,7 @@
 
 use super::header::{Element, PropertyType, ScalarType, broken};
 use crate::Result;
+use crate::source::grow;
 
 /// Place of a property: `offset` bytes after an anchor. Anchor 0 is the start of the record, anchor k the end of
 /// its k-th list.
@@ -157,6 +158,7 @@ impl Block<'_> {
 
 /// Appends the decoded values of `bytes`.
 fn entries<const N: usize, T>(bytes: &[u8], out: &mut Vec<T>, decode: impl Fn([u8; N]) -> T) {
+    grow(out, bytes.len() / N);
     out.extend(bytes.as_chunks().0.iter().map(|b| decode(*b)));
 }
 

@@ -83,17 +83,49 @@ impl<R: Read> Reader<R> {
     /// Reserves `bytes` of the budget for values of `place`.
     pub(crate) fn charge(&mut self, bytes: u64, place: &Place<'_>) -> Result<()> {
         if bytes > self.budget {
-            return Err(Error::Limits { field: place.to_string(), needed: bytes, limit: self.budget });
+            return Err(self.exceeded(bytes, place));
         }
         self.budget -= bytes;
         Ok(())
     }
 
-    /// Charges `count` elements of `T` and makes room for as many as it is safe to believe in.
+    fn exceeded(&self, needed: u64, place: &Place<'_>) -> Error {
+        Error::Limits { field: place.to_string(), needed, limit: self.budget }
+    }
+
+    /// Makes room for as many of `count` elements as it is safe to believe in; the others are left to
+    /// [`Reader::push`].
     pub(crate) fn room<T>(&mut self, out: &mut Vec<T>, count: usize, place: &Place<'_>) -> Result<()> {
-        self.charge((count as u64).saturating_mul(size_of::<T>() as u64), place)?;
-        let now = if self.length.is_some() { count } else { count.min(RESERVE_UNSEEN) };
-        out.try_reserve(now).map_err(|_| Error::Io(io::ErrorKind::OutOfMemory.into()))
+        let needed = (count as u64).saturating_mul(size_of::<T>() as u64);
+        if self.length.is_none() && needed > self.budget {
+            return Err(self.exceeded(needed, place));
+        }
+        self.grow(out, if self.length.is_some() { count } else { count.min(RESERVE_UNSEEN) }, place)
+    }
+
+    /// Makes room for `more` elements and charges what is allocated for it: a vector that grows again and again gets
+    /// a quarter more than asked for, while the budget lasts.
+    pub(crate) fn grow<T>(&mut self, out: &mut Vec<T>, more: usize, place: &Place<'_>) -> Result<()> {
+        let spare = out.capacity() - out.len();
+        if more <= spare {
+            return Ok(());
+        }
+        let bytes = |elements: usize| (elements as u64).saturating_mul(size_of::<T>() as u64);
+        let least = more - spare;
+        let ample = least.max(out.len() / 4);
+        let extra = if bytes(ample) <= self.budget { ample } else { least };
+        self.charge(bytes(extra), place)?;
+        out.try_reserve_exact(spare + extra).map_err(|_| Error::Io(io::ErrorKind::OutOfMemory.into()))
+    }
+
+    /// Appends an element, for which there may be no room yet.
+    #[inline]
+    pub(crate) fn push<T>(&mut self, out: &mut Vec<T>, element: T, place: &Place<'_>) -> Result<()> {
+        if out.len() == out.capacity() {
+            self.grow(out, 1, place)?;
+        }
+        out.push(element);
+        Ok(())
     }
 
     /// Makes at least `wanted` (≤ buffer size) bytes contiguous in the buffer, unless the input ends before.
@@ -239,11 +271,18 @@ impl<R: Read> Reader<R> {
         out: &mut Vec<T>,
         count: u64,
         place: &Place<'_>,
-        decode: impl Fn(&[u8; N]) -> T,
+        mut decode: impl FnMut(&[u8; N]) -> T,
     ) -> Result<()> {
-        let count = self.check_count(count, N as u64, place)?;
-        self.room(out, count, place)?;
-        self.for_each(count, place, |record| out.push(decode(record)))
+        let mut left = self.check_count(count, N as u64, place)?;
+        self.room(out, left, place)?;
+        let piece = if self.length.is_some() { usize::MAX } else { RESERVE_UNSEEN };
+        while left > 0 {
+            let now = left.min(piece);
+            self.grow(out, now, place)?;
+            self.for_each(now, place, |record| out.push(decode(record)))?;
+            left -= now;
+        }
+        Ok(())
     }
 
     /// A vector of `count` elements of `N` bytes each.
@@ -251,7 +290,7 @@ impl<R: Read> Reader<R> {
         &mut self,
         count: u64,
         place: &Place<'_>,
-        decode: impl Fn(&[u8; N]) -> T,
+        decode: impl FnMut(&[u8; N]) -> T,
     ) -> Result<Vec<T>> {
         let mut out = Vec::new();
         self.extend(&mut out, count, place, decode)?;

@@ -54,6 +54,10 @@ impl<R: Read> Source for BinarySource<'_, R> {
         Ok(count)
     }
 
+    fn push<T>(&mut self, out: &mut Vec<T>, element: T, place: &Place<'_>) -> Result<()> {
+        self.reader.push(out, element, place)
+    }
+
     fn u8s(&mut self, out: &mut Vec<u8>, count: u64, place: &Place<'_>) -> Result<()> {
         self.reader.extend(out, count, place, |&[byte]| byte)
     }
@@ -77,11 +81,10 @@ impl<R: Read> Source for BinarySource<'_, R> {
     }
 
     fn colors(&mut self, out: &mut Vec<[u8; 3]>, count: u64, place: &Place<'_>) -> Result<()> {
-        let count = self.room(out, count, 11, place)?;
         let mut sound = true;
-        self.reader.for_each(count, place, |&[c0, c1, c2, c3, c4, c5, c6, c7, b, g, r]| {
+        self.reader.extend(out, count, place, |&[c0, c1, c2, c3, c4, c5, c6, c7, b, g, r]| {
             sound &= u64::from_le_bytes([c0, c1, c2, c3, c4, c5, c6, c7]) == 3;
-            out.push([r, g, b]);
+            [r, g, b]
         })?;
         if sound { Ok(()) } else { Err(self.error(place, "a colour does not have 3 channels".into())) }
     }

@@ -90,6 +90,8 @@ pub(super) trait Source {
     fn string(&mut self, place: &Place<'_>) -> Result<Vec<u8>>;
     /// Makes room for `count` elements that take at least `min_size` bytes in a binary archive.
     fn room<T>(&mut self, out: &mut Vec<T>, count: u64, min_size: u64, place: &Place<'_>) -> Result<usize>;
+    /// Appends an element, for which `room` may not have made room yet.
+    fn push<T>(&mut self, out: &mut Vec<T>, element: T, place: &Place<'_>) -> Result<()>;
     fn u8s(&mut self, out: &mut Vec<u8>, count: u64, place: &Place<'_>) -> Result<()>;
     fn u32s(&mut self, out: &mut Vec<u32>, count: u64, place: &Place<'_>) -> Result<()>;
     fn f32s(&mut self, out: &mut Vec<f32>, count: u64, place: &Place<'_>) -> Result<()>;

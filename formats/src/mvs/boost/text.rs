@@ -57,7 +57,7 @@ impl<'a, R: Read> TextSource<'a, R> {
     ) -> Result<()> {
         for _ in 0..self.room(out, count, 1, place)? {
             let value = next(self)?;
-            out.push(value);
+            self.push(out, value, place)?;
         }
         Ok(())
     }
@@ -153,6 +153,10 @@ impl<R: Read> Source for TextSource<'_, R> {
         let count = self.reader.check_count(count, 1, place)?;
         self.reader.room(out, count, place)?;
         Ok(count)
+    }
+
+    fn push<T>(&mut self, out: &mut Vec<T>, element: T, place: &Place<'_>) -> Result<()> {
+        self.reader.push(out, element, place)
     }
 
     fn u8s(&mut self, out: &mut Vec<u8>, count: u64, place: &Place<'_>) -> Result<()> {

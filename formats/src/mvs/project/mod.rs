@@ -18,6 +18,12 @@ pub(super) const HEADER: usize = 20;
 const VERSION: u32 = 1;
 /// Bytes after the data that are counted at most, where they must be decompressed for it.
 const MOST_TRAILING: u64 = 1 << 20;
+/// Values that a compressed project may hold however small its file is, in bytes.
+const FREE_EXPANSION: u64 = 24 << 20;
+/// Bytes of values for each byte of a compressed project beyond that.
+const MOST_EXPANSION: u64 = 4;
+/// Logarithm of the longest distance over which zstd may refer back: 32 MiB, that of its level 20.
+const MOST_WINDOW_LOG: u32 = 25;
 
 /// How the body of a native project is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,13 +92,36 @@ pub(super) fn read_body(
             }
             read_stream(r, kind)
         }
-        ArchiveKind::Zlib => {
-            read_stream(Reader::new(flate2::bufread::ZlibDecoder::new(source), None, limits), kind)
-        }
+        ArchiveKind::Zlib => read_compressed(flate2::bufread::ZlibDecoder::new(source), length, kind, limits),
         ArchiveKind::Zstd => {
-            read_stream(Reader::new(zstd::stream::read::Decoder::with_buffer(source)?, None, limits), kind)
+            let mut decoder = zstd::stream::read::Decoder::with_buffer(source)?;
+            decoder.window_log_max(MOST_WINDOW_LOG)?;
+            read_compressed(decoder, length, kind, limits)
         }
     }
+}
+
+/// Reads from a decompressor, of whose output only the size of the file tells how much to expect.
+fn read_compressed(
+    decoder: impl Read,
+    length: Option<u64>,
+    kind: ArchiveKind,
+    limits: &Limits,
+) -> Result<(Scene, u64)> {
+    let mut r = Reader::new(decoder, None, limits);
+    if let Some(length) = length {
+        r.cap_budget(length.saturating_mul(MOST_EXPANSION).saturating_add(FREE_EXPANSION));
+    }
+    read_stream(r, kind).map_err(|error| match error {
+        Error::Limits { field, needed, limit } if length.is_some() && limit < limits.max_bytes => {
+            let rule = format!(
+                "a compressed project may hold {MOST_EXPANSION} times its size and {} MiB, save it as binary",
+                FREE_EXPANSION >> 20
+            );
+            Error::Limits { field: format!("{field} ({rule})"), needed, limit }
+        }
+        error => error,
+    })
 }
 
 fn read_stream<R: Read>(mut r: Reader<R>, kind: ArchiveKind) -> Result<(Scene, u64)> {

@@ -42,7 +42,7 @@ fn list<S: Source, T>(
     let mut out = Vec::new();
     for i in 0..s.room(&mut out, count.into(), min_size, place)? {
         let value = element(s, &place.item(i))?;
-        out.push(value);
+        s.push(&mut out, value, place)?;
     }
     Ok(out)
 }
@@ -158,13 +158,13 @@ fn read_views<S: Source>(s: &mut S, points: usize, place: &Place<'_>) -> Result<
     }
     let count = s.room(&mut views.offsets, count, 4, place)?;
     attribute(s, count, points, place)?;
-    views.offsets.push(0);
+    s.push(&mut views.offsets, 0, place)?;
     s.class(Class::ViewArr, place)?;
     for i in 0..count {
         let at = place.item(i);
         let n = s.u32(&at)?;
         s.u32s(&mut views.images, n.into(), &at)?;
-        views.offsets.push(views.images.len() as u64);
+        s.push(&mut views.offsets, views.images.len() as u64, &at)?;
     }
     Ok(views)
 }
@@ -217,7 +217,8 @@ fn read_mesh<S: Source>(s: &mut S, at: &Place<'_>) -> Result<Mesh> {
         s.class(Class::Point2f, &place)?;
         s.class(Class::CvPoint2f, &place)?;
         for _ in 0..s.room(&mut mesh.face_texcoords, count.into(), 8, &place)? {
-            mesh.face_texcoords.push(s.f32_array(&place)?);
+            let coordinates = s.f32_array(&place)?;
+            s.push(&mut mesh.face_texcoords, coordinates, &place)?;
         }
     }
     let place = at.field("faceTexindices");
@@ -243,7 +244,7 @@ fn read_lists<S: Source>(s: &mut S, place: &Place<'_>) -> Result<IndexLists> {
         let at = place.item(i);
         let n = s.u32(&at)?;
         s.u32s(&mut lists.indices, n.into(), &at)?;
-        lists.ends.push(lists.indices.len() as u64);
+        s.push(&mut lists.ends, lists.indices.len() as u64, &at)?;
     }
     Ok(lists)
 }
