@@ -12,6 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 pub(crate) const PAD: usize = 32;
 /// Mid-grey, subtracted so that sums of squares keep their digits.
 const MID_GREY: f32 = 128.0;
+/// Mid-grey in sixteenths of a grey level.
+const MID_SIXTEENTHS: i16 = 128 * 16;
 
 /// The reference image with a margin, grey levels 0..255 minus mid-grey.
 pub(crate) struct Reference {
@@ -44,8 +46,9 @@ impl Reference {
 pub(crate) struct Source {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Per pixel the 2×2 grey levels (×256) from it to the right and below, 16 bits each.
-    pub(crate) quads: Vec<u64>,
+    /// Per pixel its grey level in the low half and the one below it in the high half, signed, in sixteenths from
+    /// mid-grey; one pair more than pixels.
+    pub(crate) pairs: Vec<u32>,
     /// Homogeneous source pixel = `a · (x, y, 1) + b · w`.
     pub(crate) a: [[f32; 3]; 3],
     pub(crate) b: [f32; 3],
@@ -57,8 +60,9 @@ pub(crate) struct Source {
 pub(crate) struct SourceGeometry {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Per pixel inverse depth, its change per column and per row, 0; inverse depth 0 = none.
-    pub(crate) planes: Vec<[f32; 4]>,
+    /// Two words a pixel: the bits of its inverse depth (0 = none), and the upper halves of the bits of its change
+    /// per column (low half) and per row (high half).
+    pub(crate) planes: Vec<u32>,
     pub(crate) a: [[f32; 3]; 3],
     pub(crate) b: [f32; 3],
     /// Pixels of the reference that one unit of the source's inverse depth amounts to.
@@ -98,7 +102,7 @@ impl Level {
                 Source {
                     width: gray.width(),
                     height: gray.height(),
-                    quads: quads(&gray),
+                    pairs: pairs(&gray),
                     a: rows_f32(&a),
                     b: [b.x as f32, b.y as f32, b.z as f32],
                     geometry: None,
@@ -179,20 +183,16 @@ fn typical_inverse_depth(problem: &StereoProblem) -> f32 {
     w[w.len() / 2]
 }
 
-/// Packs every pixel's 2×2 grey levels.
-fn quads(gray: &GrayImage) -> Vec<u64> {
+/// Packs every pixel's grey level and the one below it, and one spare pair behind the last.
+fn pairs(gray: &GrayImage) -> Vec<u32> {
     let (w, h) = (gray.width(), gray.height());
-    let level = |v: f32| u64::from((v.clamp(0.0, 1.0) * 255.0 * 256.0).round() as u16);
-    let rows: Vec<u64> = gray.data().iter().map(|&v| level(v)).collect();
-    let mut out = Vec::with_capacity(w * h);
+    let level = |v: f32| u32::from(((v.clamp(0.0, 1.0) * 255.0 * 16.0 + 0.5) as i16 - MID_SIXTEENTHS) as u16);
+    let mut out = Vec::with_capacity(w * h + 1);
     for y in 0..h {
-        let top = &rows[y * w..][..w];
-        let bottom = &rows[(y + 1).min(h - 1) * w..][..w];
-        for x in 0..w {
-            let next = (x + 1).min(w - 1);
-            out.push(top[x] | top[next] << 16 | bottom[x] << 32 | bottom[next] << 48);
-        }
+        let (top, bottom) = (gray.row(y), gray.row((y + 1).min(h - 1)));
+        out.extend(top.iter().zip(bottom).map(|(&t, &b)| level(t) | level(b) << 16));
     }
+    out.push(0);
     out
 }
 
@@ -207,13 +207,13 @@ fn source_geometry(reference: &Camera, map: &DepthEstimate) -> SourceGeometry {
         .data()
         .iter()
         .enumerate()
-        .map(|(i, &depth)| {
+        .flat_map(|(i, &depth)| {
             if depth <= 0.0 {
-                return [0.0; 4];
+                return [0; 2];
             }
             let n = normals.map_or([0.0, 0.0, -1.0], |n| n[i]);
             let p = pinhole.plane((i % width) as f32, (i / width) as f32, depth, n);
-            [p.w, p.wx, p.wy, 0.0]
+            [p.w.to_bits(), upper_half(p.wx) | upper_half(p.wy) << 16]
         })
         .collect();
     let baseline = (reference.center() - map.camera.center()).norm();
@@ -226,6 +226,11 @@ fn source_geometry(reference: &Camera, map: &DepthEstimate) -> SourceGeometry {
         b: [b.x as f32, b.y as f32, b.z as f32],
         pixels_per_w: (rx * baseline) as f32,
     }
+}
+
+/// The upper half of a float's bits, rounded: eight significant bits.
+fn upper_half(v: f32) -> u32 {
+    v.to_bits().wrapping_add(0x8000) >> 16
 }
 
 const _: () = assert!(PAD >= WIN_W + REACH && PAD >= TILE_W + REACH);

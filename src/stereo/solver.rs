@@ -89,7 +89,7 @@ impl<'a> Solver<'a> {
         (self.kernels.prepare)(&mut self.tile, self.level);
         (self.kernels.begin)(&mut self.tile, self.level);
         self.tried.clear();
-        self.tile.use_all_views();
+        self.tile.views = self.level.sources.len();
         let first = rng.below(CELLS);
         let own = if pass.fresh { CELLS } else { pass.candidates.min(CELLS) };
         for k in 0..own {
@@ -113,7 +113,7 @@ impl<'a> Solver<'a> {
             let p = candidates::random(self.level, rng);
             (self.kernels.try_plane)(&mut self.tile, self.level, p);
         }
-        self.tile.use_best_views(pass.views);
+        self.tile.views = pass.views.min(self.level.sources.len());
         for k in 0..pass.candidates {
             self.shake(pass, first, k, rng);
         }

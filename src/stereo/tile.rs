@@ -42,8 +42,8 @@ pub(crate) struct Patch {
     pub(crate) texel: [WinRow; WIN_H],
     /// Bilateral weight of every texel of every pixel's window; 0 outside the image.
     pub(crate) weight: [[Row; TAPS]; TILE_H],
-    /// Sum of the weights.
-    pub(crate) sum_weight: TileMap,
+    /// One over the sum of the weights.
+    pub(crate) inverse_weight: TileMap,
     /// Weighted mean of the texels.
     pub(crate) mean: TileMap,
     /// Weighted sum of squared deviations.
@@ -84,6 +84,18 @@ pub(crate) struct Halo {
     pub(crate) w: HaloMap,
     /// 1 where there is an estimate, else 0.
     pub(crate) on: HaloMap,
+    /// The surround's columns beside the tile once more.
+    pub(crate) sides: Sides,
+}
+
+/// The columns beside a tile: the left one from top to bottom, then the right one. Fields as in [`Halo`].
+#[repr(align(64))]
+pub(crate) struct Sides {
+    pub(crate) nx: Row,
+    pub(crate) ny: Row,
+    pub(crate) nz: Row,
+    pub(crate) w: Row,
+    pub(crate) on: Row,
 }
 
 /// Scratch of one candidate.
@@ -93,23 +105,16 @@ pub(crate) struct Scratch {
     pub(crate) warped: [WinRow; WIN_H],
     /// 1 where the warped sample lies inside the source.
     pub(crate) valid: [WinRow; WIN_H],
+    /// Cost of the view at hand.
+    pub(crate) cost: TileMap,
     /// Smallest cost over the views so far.
     pub(crate) best: TileMap,
     /// Second smallest.
     pub(crate) second: TileMap,
     /// Smoothness factor that a surround pixel contributes to its neighbours.
     pub(crate) smooth: HaloMap,
-}
-
-/// A source view as seen from the tile.
-#[derive(Clone, Copy)]
-pub(crate) struct TileView {
-    /// Whether candidates are compared with it.
-    pub(crate) on: bool,
-    /// Mean cost of the last candidate compared with it.
-    pub(crate) cost: f32,
-    /// 0 for the view that suits the tile best.
-    pub(crate) rank: usize,
+    /// Smoothness factor of every pixel.
+    pub(crate) factor: TileMap,
 }
 
 /// The working set of one tile.
@@ -122,11 +127,16 @@ pub(crate) struct Tile {
     pub(crate) belief: Belief,
     pub(crate) halo: Halo,
     pub(crate) scratch: Scratch,
-    /// One entry per source of the level.
-    pub(crate) views: Vec<TileView>,
+    /// The level's sources, the one that suits the tile best first.
+    pub(crate) order: Vec<usize>,
+    /// How many of them, from the first, candidates are compared with.
+    pub(crate) views: usize,
+    /// Mean cost of the last candidate compared with each source.
+    pub(crate) view_cost: Vec<f32>,
 }
 
-const ZERO_TILE: TileMap = [[0.0; TILE_W]; TILE_H];
+const ZERO_ROW: Row = [0.0; TILE_W];
+const ZERO_TILE: TileMap = [ZERO_ROW; TILE_H];
 const ZERO_HALO: HaloMap = [[0.0; WIN_W]; TILE_H + 2];
 const ZERO_WIN: [WinRow; WIN_H] = [[0.0; WIN_W]; WIN_H];
 
@@ -139,7 +149,7 @@ impl Tile {
             patch: Patch {
                 texel: ZERO_WIN,
                 weight: [[[0.0; TILE_W]; TAPS]; TILE_H],
-                sum_weight: ZERO_TILE,
+                inverse_weight: ZERO_TILE,
                 mean: ZERO_TILE,
                 norm: ZERO_TILE,
             },
@@ -153,36 +163,33 @@ impl Tile {
                 prior_k: ZERO_TILE,
                 active: ZERO_TILE,
             },
-            halo: Halo { nx: ZERO_HALO, ny: ZERO_HALO, nz: ZERO_HALO, w: ZERO_HALO, on: ZERO_HALO },
+            halo: Halo {
+                nx: ZERO_HALO,
+                ny: ZERO_HALO,
+                nz: ZERO_HALO,
+                w: ZERO_HALO,
+                on: ZERO_HALO,
+                sides: Sides { nx: ZERO_ROW, ny: ZERO_ROW, nz: ZERO_ROW, w: ZERO_ROW, on: ZERO_ROW },
+            },
             scratch: Scratch {
                 warped: ZERO_WIN,
                 valid: ZERO_WIN,
+                cost: ZERO_TILE,
                 best: ZERO_TILE,
                 second: ZERO_TILE,
                 smooth: ZERO_HALO,
+                factor: ZERO_TILE,
             },
-            views: vec![TileView { on: true, cost: UNSEEN, rank: 0 }; sources],
+            order: (0..sources).collect(),
+            views: sources,
+            view_cost: vec![UNSEEN; sources],
         })
     }
 
-    /// From now on compares candidates with all views.
-    pub(crate) fn use_all_views(&mut self) {
-        self.views.iter_mut().for_each(|v| v.on = true);
-    }
-
-    /// Ranks the views by how well the last candidate suited them.
+    /// Orders the views by how well the last candidate, which all were compared with, suited them.
     pub(crate) fn rank_views(&mut self) {
-        let mut order: Vec<usize> = (0..self.views.len()).collect();
-        order.sort_by(|&a, &b| self.views[a].cost.total_cmp(&self.views[b].cost));
-        for (rank, i) in order.into_iter().enumerate() {
-            self.views[i].rank = rank;
-        }
-    }
-
-    /// From now on compares candidates with the `n` views ranked first. A plane's cost is the mean of its two best
-    /// views, so that a subset never makes a candidate look better than it is.
-    pub(crate) fn use_best_views(&mut self, n: usize) {
-        self.views.iter_mut().for_each(|v| v.on = v.rank < n);
+        let Tile { order, view_cost, .. } = self;
+        order.sort_by(|&a, &b| view_cost[a].total_cmp(&view_cost[b]).then(a.cmp(&b)));
     }
 
     /// The plane of pixel `(x, y)` of the tile, anchored at the tile's centre.
@@ -221,6 +228,13 @@ impl Tile {
             self.halo.ny[y].copy_from_slice(&state.wy[at..at + WIN_W]);
             self.halo.on[y].copy_from_slice(&state.active[at..at + WIN_W]);
         }
+        let Halo { nx, ny, w, on, sides, .. } = &mut self.halo;
+        for (from, to) in [(nx, &mut sides.nx), (ny, &mut sides.ny), (w, &mut sides.w), (on, &mut sides.on)] {
+            for y in 0..TILE_H {
+                to[y] = from[y + 1][0];
+                to[TILE_H + y] = from[y + 1][TILE_W + 1];
+            }
+        }
     }
 
     /// Writes the estimates back.
@@ -237,3 +251,5 @@ impl Tile {
         }
     }
 }
+
+const _: () = assert!(2 * TILE_H == TILE_W && WIN_W >= TILE_W + 2);

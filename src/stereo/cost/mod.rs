@@ -1,19 +1,19 @@
 //! Kernels of the estimator: the contract, and the choice of the instruction set.
 //!
-//! Every kernel works on one [`Tile`]. [`portable`] is the one implementation; the instruction-set files compile it
-//! again with more features enabled, and because it uses no fused multiply-add and no reassociation all levels
-//! give the same bytes.
+//! Every kernel works on one [`Tile`] and is written once, in [`kernels`], over sixteen lanes ([`lanes::Lanes`]) that
+//! each instruction set implements. No operation is fused or reassociated, so all levels give the same bytes.
 
-mod math;
+mod kernels;
+mod lanes;
 #[cfg(test)]
 mod oracle_tests;
-mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 use super::level::Level;
 use super::plane::InversePlane;
 use super::tile::Tile;
+use lanes::portable::Sixteen;
 
 /// Instruction set used by the kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,10 +98,10 @@ impl Kernels {
             #[cfg(target_arch = "x86_64")]
             CpuLevel::Avx512 if level.is_supported() => x86::AVX512,
             _ => Kernels {
-                prepare: portable::prepare,
-                begin: portable::begin,
-                score_own: portable::score_own,
-                try_plane: portable::try_plane,
+                prepare: kernels::prepare::<Sixteen>,
+                begin: kernels::begin::<Sixteen>,
+                score_own: kernels::score_own::<Sixteen>,
+                try_plane: kernels::try_plane::<Sixteen>,
             },
         }
     }

@@ -1,4 +1,4 @@
-//! The portable kernels compiled for wider x86-64 registers.
+//! The kernels compiled for wider x86-64 registers.
 //!
 //! # Safety
 //! The tables below call functions that need processor features. They are only handed out by
@@ -8,31 +8,32 @@
 use super::super::level::Level;
 use super::super::plane::InversePlane;
 use super::super::tile::Tile;
-use super::{Kernels, portable};
+use super::lanes::{avx2::Two, avx512::One};
+use super::{Kernels, kernels};
 
 macro_rules! compiled_for {
-    ($module:ident, $features:literal) => {
+    ($module:ident, $lanes:ty, $features:literal) => {
         mod $module {
             use super::*;
 
             #[target_feature(enable = $features)]
             pub(super) fn prepare(tile: &mut Tile, level: &Level) {
-                portable::prepare(tile, level);
+                kernels::prepare::<$lanes>(tile, level);
             }
 
             #[target_feature(enable = $features)]
             pub(super) fn begin(tile: &mut Tile, level: &Level) {
-                portable::begin(tile, level);
+                kernels::begin::<$lanes>(tile, level);
             }
 
             #[target_feature(enable = $features)]
             pub(super) fn score_own(tile: &mut Tile, level: &Level) {
-                portable::score_own(tile, level);
+                kernels::score_own::<$lanes>(tile, level);
             }
 
             #[target_feature(enable = $features)]
             pub(super) fn try_plane(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
-                portable::try_plane(tile, level, plane)
+                kernels::try_plane::<$lanes>(tile, level, plane)
             }
 
             // SAFETY: the table is handed out only where the features were detected.
@@ -46,8 +47,8 @@ macro_rules! compiled_for {
     };
 }
 
-compiled_for!(avx2, "avx2");
-compiled_for!(avx512, "avx2,avx512f,avx512bw,avx512dq,avx512vl");
+compiled_for!(avx2, Two, "avx2");
+compiled_for!(avx512, One, "avx2,avx512f,avx512bw,avx512dq,avx512vl");
 
 /// Kernels for AVX2.
 pub(super) const AVX2: Kernels = avx2::KERNELS;

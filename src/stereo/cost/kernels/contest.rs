@@ -1,0 +1,48 @@
+//! The contest: which pixels a candidate wins.
+
+use super::correlation::merged;
+use super::{LANE, Lanes};
+use crate::stereo::plane::InversePlane;
+use crate::stereo::tile::{CENTRE, ROBUST_COST, TILE_H, Tile};
+
+/// Most that disagreement with the coarser level can cost.
+const PRIOR_CAP: f32 = 0.5;
+
+/// Matching cost with smoothness, blended towards agreement with the coarser level where there is no texture.
+/// `prior` is the coarser level's inverse depth and its weight.
+#[inline(always)]
+pub(super) fn total<L: Lanes>(data: L, smooth: L, w: L, prior: (L, L)) -> L {
+    let t = L::select(data.lt(L::splat(ROBUST_COST)), data * smooth, data);
+    let off = (prior.0 / w.max(L::splat(1e-30)) - L::splat(1.0)).abs().min(L::splat(PRIOR_CAP));
+    t + prior.1 * (off - t)
+}
+
+/// Gives the candidate to every pixel for which its total cost is lower. One bit per row that changed.
+#[inline(always)]
+pub(super) fn accept<L: Lanes>(tile: &mut Tile, p: InversePlane, low: f32, high: f32) -> u32 {
+    let Tile { belief, scratch, .. } = tile;
+    let mut changed = 0;
+    let along = L::splat(p.wx) * (L::load(&LANE) - L::splat(CENTRE.0));
+    for y in 0..TILE_H {
+        let data: L = merged(&scratch.best[y], &scratch.second[y]);
+        let smooth = L::load(&scratch.factor[y]);
+        let w = L::splat(p.w + p.wy * (y as f32 - CENTRE.1)) + along;
+        let t = total(data, smooth, w, (L::load(&belief.prior_w[y]), L::load(&belief.prior_k[y])));
+        let old = L::load(&belief.total[y]);
+        let possible = L::both(L::splat(low).le(w), w.le(L::splat(high)));
+        let better = L::both(t.lt(old), L::both(possible, L::splat(0.5).lt(L::load(&belief.active[y]))));
+        if L::any(better) {
+            changed |= 1 << y;
+            L::select(better, t, old).store(&mut belief.total[y]);
+            for (row, new) in [
+                (&mut belief.data[y], data),
+                (&mut belief.w[y], w),
+                (&mut belief.wx[y], L::splat(p.wx)),
+                (&mut belief.wy[y], L::splat(p.wy)),
+            ] {
+                L::select(better, new, L::load(row)).store(row);
+            }
+        }
+    }
+    changed
+}

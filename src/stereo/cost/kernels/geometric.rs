@@ -1,0 +1,41 @@
+//! The geometric term: agreement with the source views' own depth maps.
+
+use super::{LANE, Lanes};
+use crate::stereo::level::SourceGeometry;
+
+/// A source depth farther than this from the hypothesis, relatively, says nothing about it but "disagrees".
+const GATE: f32 = 0.03;
+/// Most pixels of disagreement that count.
+const CAP: f32 = 4.0;
+
+/// What disagreement adds to the costs of a row of hypotheses with inverse depths `w` from pixel `(x, y)` on: how
+/// far, in pixels, the source's own depth map is off, sampled backwards with its plane at the exact position, so that
+/// the term pulls neither way.
+#[inline(always)]
+pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, (x, y): (f32, f32), w: L, weight: f32) -> L {
+    let column = L::splat(x) + L::load(&LANE);
+    let row =
+        |r: usize| L::splat(g.a[r][0]) * column + L::splat(g.a[r][1] * y + g.a[r][2]) + L::splat(g.b[r]) * w;
+    let (one, near) = (L::splat(1.0), L::splat(1e-6));
+    let z = row(2);
+    let r = one / near.max(z);
+    let (u, v) = (row(0) * r, row(1) * r);
+    let ku = one.max(u).min(L::splat(g.width as f32 - 2.0));
+    let kv = one.max(v).min(L::splat(g.height as f32 - 2.0));
+    let inside = L::both(((ku - u).abs() + (kv - v).abs()).le(L::splat(0.0)), near.lt(z));
+    let half = L::splat(0.5);
+    let (fu, iu) = (ku + half).fraction_and_index();
+    let (fv, iv) = (kv + half).fraction_and_index();
+    let index = L::plus(L::times(iv, L::whole(g.width as u32)), iu);
+    let (p, slopes) = L::fetch(&g.planes, L::shifted_left::<1>(index));
+    let p = L::from_bits(p);
+    let wx = L::from_bits(L::shifted_left::<16>(slopes));
+    let wy = L::from_bits(L::masked(slopes, 0xffff_0000));
+    let there = p + wx * (fu - half) + wy * (fv - half);
+    let here = w * r;
+    let d = (there - here).abs();
+    let e = d * L::splat(g.pixels_per_w);
+    let pixels = (e * (e + L::splat(2.0))).sqrt().min(L::splat(CAP));
+    let known = L::both(L::splat(0.0).lt(p), d.lt(here * L::splat(GATE)));
+    L::select(L::both(inside, known), pixels, L::splat(CAP)) * L::splat(weight)
+}

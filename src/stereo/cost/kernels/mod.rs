@@ -1,0 +1,103 @@
+//! The kernels, written once over [`Lanes`]; an instruction set supplies the lanes.
+
+mod contest;
+mod correlation;
+mod geometric;
+mod own;
+mod patch;
+mod smoothness;
+mod warp;
+
+pub(super) use own::score_own;
+pub(super) use patch::prepare;
+pub(super) use smoothness::begin;
+
+use super::lanes::Lanes;
+use crate::stereo::level::Level;
+use crate::stereo::plane::InversePlane;
+use crate::stereo::tile::{CENTRE, REACH, ROBUST_COST, Row, TILE_H, TILE_W, Tile, TileMap, UNSEEN, WinRow};
+use geometric::geometric_term;
+use warp::{Coverage, warp};
+
+const ZERO: Row = [0.0; TILE_W];
+/// The number of each lane.
+const LANE: Row = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+
+/// The 16 values from column `at`.
+#[inline(always)]
+fn cut<L: Lanes>(row: &WinRow, at: usize) -> L {
+    L::load(row[at..].first_chunk::<TILE_W>().unwrap_or(&ZERO))
+}
+
+/// Tries one plane on all pixels of the tile; pixels that it suits better take it. The plane is anchored at the
+/// tile's centre. Returns whether any pixel took it.
+#[inline(always)]
+pub(super) fn try_plane<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
+    let (low, high) = level.w_range;
+    let thinkable = plane.w >= low * 0.5 && plane.w <= high * 2.0;
+    if !thinkable {
+        return false;
+    }
+    smoothness::of_candidate::<L>(tile, level, plane);
+    if !data_cost::<L>(tile, level, plane) {
+        return false;
+    }
+    let changed = contest::accept::<L>(tile, plane, low, high);
+    smoothness::refresh::<L>(tile, level, changed);
+    changed != 0
+}
+
+/// Matching cost of a plane over the sources in use, as the best and second best per pixel. False if no source sees
+/// it.
+#[inline(always)]
+fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
+    let Tile { x0, y0, patch, scratch, order, views, view_cost, .. } = tile;
+    scratch.best = [[UNSEEN; TILE_W]; TILE_H];
+    scratch.second = [[UNSEEN; TILE_W]; TILE_H];
+    let mut any = false;
+    for &k in order.iter().take(*views) {
+        let source = &level.sources[k];
+        view_cost[k] = UNSEEN;
+        let coverage = warp::<L>(source, *x0, *y0, plane, scratch);
+        if coverage == Coverage::None {
+            continue;
+        }
+        any = true;
+        correlation::of_tile::<L>(patch, &scratch.warped, &mut scratch.cost);
+        if coverage == Coverage::Part {
+            reject_outside::<L>(&scratch.valid, &mut scratch.cost);
+        }
+        if let Some(g) = &source.geometry {
+            for y in 0..TILE_H {
+                let column = L::load(&LANE) - L::splat(CENTRE.0);
+                let w = L::splat(plane.w + plane.wy * (y as f32 - CENTRE.1)) + L::splat(plane.wx) * column;
+                let at = (*x0 as f32, (*y0 + y as i32) as f32);
+                let term = geometric_term(g, at, w, level.geometric_weight);
+                let cost = L::load(&scratch.cost[y]);
+                let robust = L::splat(ROBUST_COST);
+                L::select(cost.lt(robust), cost + term, cost).store(&mut scratch.cost[y]);
+            }
+        }
+        let mut sum = L::splat(0.0);
+        for y in 0..TILE_H {
+            let cost = L::load(&scratch.cost[y]);
+            let (best, second) = (L::load(&scratch.best[y]), L::load(&scratch.second[y]));
+            second.min(best.max(cost)).store(&mut scratch.second[y]);
+            best.min(cost).store(&mut scratch.best[y]);
+            sum = sum + cost;
+        }
+        view_cost[k] = sum.sum() / (TILE_W * TILE_H) as f32;
+    }
+    any
+}
+
+/// Pixels whose matching window is not wholly inside the source get the robust cost.
+#[inline(always)]
+fn reject_outside<L: Lanes>(valid: &[WinRow], cost: &mut TileMap) {
+    for y in 0..TILE_H {
+        let (top, bottom) = (&valid[y], &valid[y + 2 * REACH]);
+        let all = (cut::<L>(top, 0) * cut(top, 2 * REACH)) * (cut::<L>(bottom, 0) * cut(bottom, 2 * REACH));
+        let inside = L::splat(0.5).lt(all);
+        L::select(inside, L::load(&cost[y]), L::splat(ROBUST_COST)).store(&mut cost[y]);
+    }
+}
