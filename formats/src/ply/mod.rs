@@ -13,6 +13,7 @@
 
 mod ascii;
 mod cloud;
+mod columns;
 mod header;
 mod layout;
 mod read;

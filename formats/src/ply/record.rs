@@ -65,14 +65,20 @@ impl RecordLayout {
         for place in &self.lists {
             let PropertyType::List { count, item } = place.kind else { continue };
             let position = anchor.saturating_add(place.offset);
-            let Some(n) = bytes.get(position..).and_then(|b| decode(b, count, big_endian)) else {
+            let counted = match count {
+                ScalarType::U8 => bytes.get(position).map(|&n| usize::from(n)),
+                _ => match bytes.get(position..).and_then(|b| decode(b, count, big_endian)) {
+                    Some(n) if n < 0.0 => {
+                        return Err(broken(at + position as u64, "list", format!("a count of {n}")));
+                    }
+                    n => n.map(|n| n as usize),
+                },
+            };
+            let Some(n) = counted else {
                 anchors.truncate(before);
                 return Ok(None);
             };
-            if n < 0.0 {
-                return Err(broken(at + position as u64, "list", format!("a count of {n}")));
-            }
-            let items = (n as usize).saturating_mul(item.bytes());
+            let items = n.saturating_mul(item.bytes());
             anchor = items.saturating_add(position + count.bytes());
             anchors.push(anchor);
         }
@@ -129,6 +135,52 @@ impl Block<'_> {
         }
     }
 
+    /// Calls `take` with three neighbouring values of `N` bytes of every record, as they are stored, and returns true
+    /// if the places are three such neighbours in a little-endian file; else does nothing.
+    pub(super) fn packed<const N: usize>(
+        &self,
+        [a, b, c]: [Place; 3],
+        kind: ScalarType,
+        mut take: impl FnMut(&[[u8; N]; 3]),
+    ) -> bool {
+        let follows = |p: Place, k| p == Place { offset: a.offset + k * N, ..a };
+        if a.kind != PropertyType::Scalar(kind) || !follows(b, 1) || !follows(c, 2) || self.big_endian {
+            return false;
+        }
+        for anchors in self.anchors.chunks_exact(self.stride) {
+            let position = anchors[a.anchor] + a.offset;
+            if let ([x, y, z, ..], _) = self.bytes[position..].as_chunks::<N>() {
+                take(&[*x, *y, *z]);
+            }
+        }
+        true
+    }
+
+    /// The bytes of the entries of record `index` at a list's place.
+    fn list_bytes(&self, index: usize, place: Place, count: ScalarType) -> &[u8] {
+        let anchors = &self.anchors[index * self.stride..(index + 1) * self.stride];
+        let first = anchors[place.anchor] + place.offset + count.bytes();
+        &self.bytes[first..anchors[place.anchor + 1]]
+    }
+
+    /// [`Block::list`] of entries of the type `T` itself, where the file is little-endian and they are stored so.
+    pub(super) fn plain_list<T, const N: usize>(
+        &self,
+        index: usize,
+        place: Place,
+        kind: ScalarType,
+        out: &mut Vec<T>,
+        convert: impl Fn([u8; N]) -> T,
+    ) -> Option<usize> {
+        let PropertyType::List { count, item } = place.kind else { return None };
+        if item != kind || self.big_endian {
+            return None;
+        }
+        let bytes = self.list_bytes(index, place, count);
+        entries(bytes, out, convert);
+        Some(bytes.len() / N)
+    }
+
     /// Appends the entries of record `index` at a list's place and returns their number.
     pub(super) fn list<T>(
         &self,
@@ -138,9 +190,7 @@ impl Block<'_> {
         convert: impl Fn(f64) -> T,
     ) -> usize {
         let PropertyType::List { count, item } = place.kind else { return 0 };
-        let anchors = &self.anchors[index * self.stride..(index + 1) * self.stride];
-        let first = anchors[place.anchor] + place.offset + count.bytes();
-        let bytes = &self.bytes[first..anchors[place.anchor + 1]];
+        let bytes = self.list_bytes(index, place, count);
         let big = self.big_endian;
         match item {
             ScalarType::I8 => entries(bytes, out, |b| convert(f64::from(i8::from_le_bytes(b)))),

@@ -265,7 +265,21 @@ impl<R: Read> Reader<R> {
         Ok(())
     }
 
+    /// Appends `count` elements of `N` bytes each that are buffered.
+    #[inline]
+    fn take<T, const N: usize>(
+        &mut self,
+        out: &mut Vec<T>,
+        count: usize,
+        decode: &mut impl FnMut(&[u8; N]) -> T,
+    ) {
+        let (records, _) = self.buffer[self.start..self.start + count * N].as_chunks::<N>();
+        out.extend(records.iter().map(decode));
+        self.advance(count * N);
+    }
+
     /// Appends `count` elements of `N` bytes each; charges them and reads them in bulk.
+    #[inline]
     pub(crate) fn extend<T, const N: usize>(
         &mut self,
         out: &mut Vec<T>,
@@ -273,13 +287,21 @@ impl<R: Read> Reader<R> {
         place: &Place<'_>,
         mut decode: impl FnMut(&[u8; N]) -> T,
     ) -> Result<()> {
+        let available = (self.end - self.start) / N;
+        if count <= available as u64 && out.capacity() - out.len() >= count as usize {
+            self.take(out, count as usize, &mut decode);
+            return Ok(());
+        }
         let mut left = self.check_count(count, N as u64, place)?;
         self.room(out, left, place)?;
         let piece = if self.length.is_some() { usize::MAX } else { RESERVE_UNSEEN };
         while left > 0 {
-            let now = left.min(piece);
+            if self.fill(N)? < N {
+                return Err(self.truncated((left as u64).saturating_mul(N as u64), place));
+            }
+            let now = left.min(piece).min((self.end - self.start) / N);
             self.grow(out, now, place)?;
-            self.for_each(now, place, |record| out.push(decode(record)))?;
+            self.take(out, now, &mut decode);
             left -= now;
         }
         Ok(())
