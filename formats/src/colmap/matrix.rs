@@ -99,8 +99,7 @@ pub fn read_matrix_size(source: impl Read, length: Option<u64>) -> Result<[u32; 
     let mut r = Reader::new(source, length.map(|n| n.min(MAX_HEADER as u64)), &Limits::default());
     let sizes = read_header(&mut r)?;
     let values = sizes.iter().try_fold(4u64, |n, &size| n.checked_mul(size.into()));
-    let header = sizes.iter().map(|size| size.to_string().len() as u64 + 1).sum::<u64>();
-    let expected = values.and_then(|n| n.checked_add(header));
+    let expected = values.and_then(|n| n.checked_add(r.offset()));
     if length.is_some_and(|found| expected != Some(found)) {
         let [width, height, channels] = sizes;
         let what =

@@ -233,6 +233,15 @@ fn maps_are_stored_channel_after_channel() {
 }
 
 #[test]
+fn leading_zeros_in_sizes_are_read_and_measured_alike() {
+    let bytes = [b"3&0000002&1&".as_slice(), &[0; 24]].concat();
+    let length = Some(bytes.len() as u64);
+    let map = Matrix::read(bytes.as_slice(), length, &limits()).unwrap();
+    let size = super::matrix::read_matrix_size(bytes.as_slice(), length).unwrap();
+    assert_eq!((size, [3, 2, 1]), ([map.width, map.height, map.channels], size));
+}
+
+#[test]
 fn broken_maps_are_refused() {
     let mut good = Vec::new();
     Matrix::from_depths(3, 2, vec![1.5; 6]).unwrap().write(&mut good).unwrap();

@@ -175,9 +175,9 @@ fn read_points<R: Read>(r: &mut Reader<R>) -> Result<PointCloud> {
         let n = r.check_count(n, 8, &at)?;
         r.grow(&mut views.images, n, &at)?;
         r.grow(&mut views.weights, n, &at)?;
-        r.for_each(n, &at, |&[a, b, c, d, e, f, g, h]| {
-            views.images.push(u32::from_le_bytes([a, b, c, d]));
-            views.weights.push(f32::from_le_bytes([e, f, g, h]));
+        r.for_each_block(n, &at, |pairs: &[[u8; 8]]| {
+            views.images.extend(pairs.iter().map(|&[a, b, c, d, ..]| u32::from_le_bytes([a, b, c, d])));
+            views.weights.extend(pairs.iter().map(|&[.., e, f, g, h]| f32::from_le_bytes([e, f, g, h])));
         })?;
         views.offsets.push(views.images.len() as u64);
     }

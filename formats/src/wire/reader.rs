@@ -60,6 +60,11 @@ impl<R: Read> Reader<R> {
         self.offset = offset;
     }
 
+    /// Bytes of the input that were read.
+    pub(crate) fn offset(&self) -> u64 {
+        self.offset
+    }
+
     /// Bytes left, if the length of the input is known.
     pub(crate) fn remaining(&self) -> Option<u64> {
         self.length.map(|n| n.saturating_sub(self.offset))
@@ -104,12 +109,15 @@ impl<R: Read> Reader<R> {
     }
 
     /// Makes room for `more` elements and charges what is allocated for it: a vector that grows again and again gets
-    /// a quarter more than asked for, while the budget lasts.
+    /// a quarter more than it holds, while the budget lasts.
+    #[inline]
     pub(crate) fn grow<T>(&mut self, out: &mut Vec<T>, more: usize, place: &Place<'_>) -> Result<()> {
+        if more <= out.capacity() - out.len() { Ok(()) } else { self.enlarge(out, more, place) }
+    }
+
+    #[cold]
+    fn enlarge<T>(&mut self, out: &mut Vec<T>, more: usize, place: &Place<'_>) -> Result<()> {
         let spare = out.capacity() - out.len();
-        if more <= spare {
-            return Ok(());
-        }
         let bytes = |elements: usize| (elements as u64).saturating_mul(size_of::<T>() as u64);
         let least = more - spare;
         let ample = least.max(out.len() / 4);
@@ -239,43 +247,26 @@ impl<R: Read> Reader<R> {
         })
     }
 
-    /// Hands the next `count` records of `N` bytes to `each`, in order.
+    /// Hands the next `count` records of `N` bytes to `take`, in order, as many at a time as are buffered.
     #[inline]
-    pub(crate) fn for_each<const N: usize>(
+    pub(crate) fn for_each_block<const N: usize>(
         &mut self,
         count: usize,
         place: &Place<'_>,
-        mut each: impl FnMut(&[u8; N]),
+        mut take: impl FnMut(&[[u8; N]]),
     ) -> Result<()> {
         let mut left = count;
         while left > 0 {
-            let have = match self.end - self.start {
-                buffered if buffered >= N => buffered,
-                _ => self.fill(N)?,
-            };
-            let (records, _) = self.buffer[self.start..self.start + have].as_chunks::<N>();
-            if records.is_empty() {
+            if self.end - self.start < N && self.fill(N)? < N {
                 return Err(self.truncated((left as u64).saturating_mul(N as u64), place));
             }
+            let (records, _) = self.buffer[self.start..self.end].as_chunks::<N>();
             let now = records.len().min(left);
-            records[..now].iter().for_each(&mut each);
+            take(&records[..now]);
             self.advance(now * N);
             left -= now;
         }
         Ok(())
-    }
-
-    /// Appends `count` elements of `N` bytes each that are buffered.
-    #[inline]
-    fn take<T, const N: usize>(
-        &mut self,
-        out: &mut Vec<T>,
-        count: usize,
-        decode: &mut impl FnMut(&[u8; N]) -> T,
-    ) {
-        let (records, _) = self.buffer[self.start..self.start + count * N].as_chunks::<N>();
-        out.extend(records.iter().map(decode));
-        self.advance(count * N);
     }
 
     /// Appends `count` elements of `N` bytes each; charges them and reads them in bulk.
@@ -287,21 +278,13 @@ impl<R: Read> Reader<R> {
         place: &Place<'_>,
         mut decode: impl FnMut(&[u8; N]) -> T,
     ) -> Result<()> {
-        let available = (self.end - self.start) / N;
-        if count <= available as u64 && out.capacity() - out.len() >= count as usize {
-            self.take(out, count as usize, &mut decode);
-            return Ok(());
-        }
         let mut left = self.check_count(count, N as u64, place)?;
         self.room(out, left, place)?;
         let piece = if self.length.is_some() { usize::MAX } else { RESERVE_UNSEEN };
         while left > 0 {
-            if self.fill(N)? < N {
-                return Err(self.truncated((left as u64).saturating_mul(N as u64), place));
-            }
-            let now = left.min(piece).min((self.end - self.start) / N);
+            let now = left.min(piece);
             self.grow(out, now, place)?;
-            self.take(out, now, &mut decode);
+            self.for_each_block(now, place, |records| out.extend(records.iter().map(&mut decode)))?;
             left -= now;
         }
         Ok(())
