@@ -109,7 +109,7 @@ fn archives(folder: &Path) -> Vec<(&'static str, std::path::PathBuf, u64)> {
 /// What was read.
 #[expect(dead_code, reason = "kept only to be dropped after the clock was read")]
 enum Read {
-    Ply(ply::Cloud),
+    Ply(Box<ply::Cloud>),
     Mvs(Box<SceneFile>),
 }
 
@@ -132,7 +132,9 @@ fn read(c: &mut Criterion) {
         group.bench_function(name, |b| {
             b.iter_custom(|iterations| {
                 let read = || match name.starts_with("ply") {
-                    true => Read::Ply(ply::read_cloud(std::fs::File::open(&path).unwrap(), &limits).unwrap()),
+                    true => Read::Ply(Box::new(
+                        ply::read_cloud(std::fs::File::open(&path).unwrap(), &limits).unwrap(),
+                    )),
                     false => Read::Mvs(Box::new(SceneFile::read(&path, &limits).unwrap())),
                 };
                 let timed = || {
