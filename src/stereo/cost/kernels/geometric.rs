@@ -24,9 +24,9 @@ pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, (x, y): (f32, f32), w
     let kv = one.max(v).min(L::splat(g.height as f32 - 2.0));
     let inside = L::both(((ku - u).abs() + (kv - v).abs()).le(L::splat(0.0)), near.lt(z));
     let half = L::splat(0.5);
-    let (fu, iu) = (ku + half).fraction_and_index();
-    let (fv, iv) = (kv + half).fraction_and_index();
-    let index = L::plus(L::times(iv, L::whole(g.width as u32)), iu);
+    let (fu, iu) = (ku + half).fraction_and_whole();
+    let (fv, iv) = (kv + half).fraction_and_whole();
+    let index = L::row_major(iu, iv, g.width);
     let (p, slopes) = L::fetch(&g.planes, L::shifted_left::<1>(index));
     let p = L::from_bits(p);
     let wx = L::from_bits(L::shifted_left::<16>(slopes));

@@ -33,15 +33,33 @@ pub(in crate::stereo::cost) fn score_own<L: Lanes>(tile: &mut Tile, level: &Leve
 #[inline(always)]
 fn of_row<L: Lanes>(patch: &Patch, source: &Source, at: (f32, f32), planes: [L; 3], y: usize) -> L {
     let warps = WarpRow::new(source, at, planes);
+    let inside = warps.inside(source);
+    let sums = match L::all(inside) {
+        true => correlated::<L, true>(patch, source, &warps, y),
+        false => correlated::<L, false>(patch, source, &warps, y),
+    };
+    L::select(inside, finish(patch, y, sums), L::splat(ROBUST_COST))
+}
+
+/// Sums over the windows of row `y`; unless they are all `INSIDE` the source, samples are clamped.
+#[inline(always)]
+fn correlated<L: Lanes, const INSIDE: bool>(
+    patch: &Patch,
+    source: &Source,
+    warps: &WarpRow<L>,
+    y: usize,
+) -> Sums<L> {
     let mut sums: Sums<L> = [L::splat(0.0); 3];
     for tap in 0..TAPS {
         let (i, j) = (tap / 5 * 2, tap % 5 * 2);
-        let (u, v, _) = warps.at(j as f32 - REACH as f32, i as f32 - REACH as f32);
-        let (u, v, _) = clamped(source, u, v);
+        let (mut u, mut v) = warps.near(j as f32 - REACH as f32, i as f32 - REACH as f32);
+        if !INSIDE {
+            (u, v, _) = clamped(source, u, v);
+        }
         let t = cut(&patch.texel[y + i], j);
         add(&mut sums, texels(source, u, v), t, L::load(&patch.weight[y][tap]));
     }
-    L::select(warps.inside(source), finish(patch, y, sums), L::splat(ROBUST_COST))
+    sums
 }
 
 /// The homographies of a row of pixels, each anchored at its pixel: source pixel of an offset `(ox, oy)` is
@@ -84,6 +102,16 @@ impl<L: Lanes> WarpRow<L> {
         let r = L::splat(1.0) / z;
         let along = |k: usize| self.centre[k] + (ox * self.d_dx[k] + oy * self.d_dy[k]) * r;
         (along(0), along(1), z)
+    }
+
+    /// Source pixels of an offset within the matching window, where 1 / z is 1 − e + e² for any usable plane.
+    #[inline(always)]
+    fn near(&self, ox: f32, oy: f32) -> (L, L) {
+        let (ox, oy, one) = (L::splat(ox), L::splat(oy), L::splat(1.0));
+        let e = ox * self.z_dx + oy * self.z_dy;
+        let r = one - e * (one - e);
+        let along = |k: usize| self.centre[k] + (ox * self.d_dx[k] + oy * self.d_dy[k]) * r;
+        (along(0), along(1))
     }
 
     /// Where the whole matching window lies inside the source and in front of it.

@@ -10,7 +10,7 @@ pub(super) const MIN_DEPTH_RATIO: f32 = 0.3;
 /// Half the extent of the window.
 const HALF: (f32, f32) = ((WIN_W as f32 - 1.0) / 2.0, (WIN_H as f32 - 1.0) / 2.0);
 /// Change of the depth ratio within the window up to which its inverse is a short series: the error, in pixels, is
-/// below a window's half extent times this to the fifth power.
+/// below a window's half extent times this to the fourth power.
 const SERIES: f32 = 0.05;
 
 /// How much of a warped window lies inside the source.
@@ -133,7 +133,7 @@ fn sample<L: Lanes, const WHOLE: bool, const SERIES: bool>(source: &Source, m: &
         let (ox, oy) = (L::load(ox), L::load(oy));
         let e = ox * L::splat(m.z_dx) + oy * L::splat(m.z_dy);
         // 1 / (1 + e)
-        let r = if SERIES { one - e * (one - e * (one - e * (one - e))) } else { one / (one + e) };
+        let r = if SERIES { one - e * (one - e * (one - e)) } else { one / (one + e) };
         let mut u = L::splat(m.u) + (ox * L::splat(m.du_dx) + oy * L::splat(m.du_dy)) * r;
         let mut v = L::splat(m.v) + (ox * L::splat(m.dv_dx) + oy * L::splat(m.dv_dy)) * r;
         if !WHOLE {
@@ -158,9 +158,9 @@ pub(super) fn clamped<L: Lanes>(source: &Source, u: L, v: L) -> (L, L, L::Mask) 
 /// Bilinear samples of the source, 65536 per grey level, mid-grey is 0.
 #[inline(always)]
 pub(super) fn texels<L: Lanes>(source: &Source, u: L, v: L) -> L {
-    let (fu, iu) = u.fraction_and_index();
-    let (fv, iv) = v.fraction_and_index();
-    let index = L::plus(L::times(iv, L::whole(source.width as u32)), iu);
+    let (fu, iu) = u.fraction_and_whole();
+    let (fv, iv) = v.fraction_and_whole();
+    let index = L::row_major(iu, iv, source.width);
     let (left, right) = L::fetch(&source.pairs, index);
     let (left, right) = (L::lerp_halves(left, fv), L::lerp_halves(right, fv));
     left + fu * (right - left)

@@ -110,6 +110,11 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
+    fn all(mask: (__m256, __m256)) -> bool {
+        unsafe { _mm256_movemask_ps(_mm256_and_ps(mask.0, mask.1)) == 0xff }
+    }
+
+    #[inline(always)]
     fn select(mask: (__m256, __m256), yes: Self, no: Self) -> Self {
         unsafe { Two(_mm256_blendv_ps(no.0, yes.0, mask.0), _mm256_blendv_ps(no.1, yes.1, mask.1)) }
     }

@@ -36,7 +36,7 @@ operator!(Div, div, _mm512_div_ps);
 impl Lanes for One {
     type Bits = __m512i;
     type Mask = __mmask16;
-    const ROWS: usize = 4;
+    const ROWS: usize = 2;
 
     #[inline(always)]
     fn splat(v: f32) -> Self {
@@ -91,6 +91,11 @@ impl Lanes for One {
     #[inline(always)]
     fn any(mask: __mmask16) -> bool {
         mask != 0
+    }
+
+    #[inline(always)]
+    fn all(mask: __mmask16) -> bool {
+        mask == __mmask16::MAX
     }
 
     #[inline(always)]

@@ -42,6 +42,7 @@ pub(crate) trait Lanes:
     fn le(self, other: Self) -> Self::Mask;
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     fn any(mask: Self::Mask) -> bool;
+    fn all(mask: Self::Mask) -> bool;
     /// `yes` where the mask is set, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     fn to_bits(self) -> Self::Bits;
@@ -67,12 +68,23 @@ pub(crate) trait Lanes:
         row.iter().sum()
     }
 
-    /// Splits lanes in 0.5..2²² into an index and the fraction above it; the fraction is in 0..=1.
+    /// Splits lanes in 0.5..2²² into a whole number, in the low bits of the second result, and the fraction above it;
+    /// the fraction is in 0..=1.
     #[inline(always)]
-    fn fraction_and_index(self) -> (Self, Self::Bits) {
+    fn fraction_and_whole(self) -> (Self, Self::Bits) {
         let shifted = (self - Self::splat(0.5)) + Self::splat(MAGIC);
-        let whole = shifted - Self::splat(MAGIC);
-        (self - whole, Self::plus(shifted.to_bits(), Self::whole(MAGIC_BITS.wrapping_neg())))
+        (self - (shifted - Self::splat(MAGIC)), shifted.to_bits())
+    }
+
+    /// `row · width + column` of whole numbers from [`Lanes::fraction_and_whole`].
+    #[inline(always)]
+    fn row_major(column: Self::Bits, row: Self::Bits, width: usize) -> Self::Bits {
+        let width = width as u32;
+        let excess = MAGIC_BITS.wrapping_mul(width).wrapping_add(MAGIC_BITS);
+        Self::plus(
+            Self::plus(Self::times(row, Self::whole(width)), column),
+            Self::whole(excess.wrapping_neg()),
+        )
     }
 
     /// A bell of unit height: close to e⁻ˣ for x ≥ 0, and 0 from x = 8 on.

@@ -95,6 +95,11 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
+    fn all(mask: [u32; 16]) -> bool {
+        mask.iter().fold(!0, |a, b| a & b) == !0
+    }
+
+    #[inline(always)]
     fn select(mask: [u32; 16], yes: Self, no: Self) -> Self {
         Sixteen(from_fn(|i| f32::from_bits(yes.0[i].to_bits() & mask[i] | no.0[i].to_bits() & !mask[i])))
     }

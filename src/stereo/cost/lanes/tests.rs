@@ -27,9 +27,9 @@ fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32]) -> Vec<[u32; 16]> {
     let indices = std::array::from_fn(|i| f32::from_bits((a[i].abs() as u32).min(WORDS as u32 - 2)));
     let (words, next) = L::fetch(memory, L::load(&indices).to_bits());
     let fractions = (x.abs() * L::splat(1.0 / 300.0)).min(L::splat(1.0));
-    let (fraction, index) = (x.abs() + L::splat(0.75)).min(L::splat(4e6)).fraction_and_index();
-    let bits = L::plus(L::times(index, L::whole(17)), L::masked(L::shifted_left::<3>(y.to_bits()), 0xff00));
-    let any = L::splat(f32::from(u8::from(L::any(less))));
+    let (fraction, whole) = (x.abs() + L::splat(0.75)).min(L::splat(4e6)).fraction_and_whole();
+    let bits = L::plus(L::row_major(whole, whole, 17), L::masked(L::shifted_left::<3>(y.to_bits()), 0xff00));
+    let any = L::splat(f32::from(u8::from(L::any(less)) + 2 * u8::from(L::all(L::splat(-1e9).lt(x)))));
     [x + y, x - y, x * y, x / y, x.min(y), x.max(y), x.abs().sqrt(), L::select(less, x, y), any]
         .into_iter()
         .chain([L::from_bits(words), L::from_bits(next), L::from_bits(bits), fraction])
@@ -73,8 +73,12 @@ fn plain_lanes_compute_what_they_say() {
     let quarter = Sixteen::splat(0.25);
     let words = [0x0040_0010u32; 16]; // low half 16, high half 64
     assert_eq!(stored(Sixteen::lerp_halves(words, quarter)), [(4096.0f32 * 28.0).to_bits(); 16]);
-    let (fraction, index) = Sixteen::splat(6.75).fraction_and_index();
-    assert_eq!((stored(fraction), index), ([0.75f32.to_bits(); 16], [6; 16]));
+    let (fraction, column) = Sixteen::splat(6.75).fraction_and_whole();
+    let (_, row) = Sixteen::splat(2.25).fraction_and_whole();
+    assert_eq!(
+        (stored(fraction), Sixteen::row_major(column, row, 100)),
+        ([0.75f32.to_bits(); 16], [206; 16])
+    );
     assert_eq!(Sixteen::fetch(&[1, 2, 3], [1; 16]), ([2; 16], [3; 16]));
 }
 
