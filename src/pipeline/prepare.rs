@@ -10,7 +10,8 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::progress::{Event, Progress, SceneSummary};
 use crate::scene::{
-    ImageId, NeighborOptions, Scene, ViewIndex, ViewNeighbors, estimate_roi, select_neighbors,
+    ImageId, NeighborOptions, Scene, Tracks, ViewIndex, ViewNeighbors, estimate_roi, select_neighbors,
+    virtual_points,
 };
 use crate::store::import::{LoadedScene, load_scene};
 use semvs_formats::Limits;
@@ -26,6 +27,8 @@ pub(super) struct Prepared {
     /// Why a calibrated view takes no part.
     pub(super) dropped: Vec<Option<String>>,
     pub(super) neighbors: Vec<ViewNeighbors>,
+    /// Points in place of the sparse ones, which tell depth ranges, where the scene has none.
+    pub(super) made_up: Tracks,
     pub(super) images: Images,
     pub(super) masks: Option<Masks>,
     pub(super) labels: Option<Labels>,
@@ -132,10 +135,34 @@ pub(super) fn prepare(
         return Err(Error::content(&loaded.path, what));
     }
     progress.event(Event::ImagesPrepared { images: usable, elapsed: start.elapsed() });
-    let neighbors = select_neighbors(&loaded.scene, &cameras, &job.neighbors)?;
-    let prepared = Prepared { loaded, cameras, dropped, neighbors, images, masks, labels };
+    let (neighbors, made_up) = find_neighbors(&loaded.scene, &cameras, &job.neighbors, progress)?;
+    let prepared = Prepared { loaded, cameras, dropped, neighbors, made_up, images, masks, labels };
     report_pairs(&prepared, start, progress)?;
     Ok(prepared)
+}
+
+/// The neighbours of all views and, for a scene without sparse points, the points that were made up in their place.
+///
+/// # Errors
+/// As [`select_neighbors`].
+fn find_neighbors(
+    scene: &Scene,
+    cameras: &[Option<Camera>],
+    options: &NeighborOptions,
+    progress: &Progress,
+) -> Result<(Vec<ViewNeighbors>, Tracks)> {
+    let made_up = if scene.tracks.is_empty() { virtual_points(cameras) } else { Tracks::default() };
+    if made_up.is_empty() {
+        return Ok((select_neighbors(scene, cameras, options)?, made_up));
+    }
+    progress.warn(
+        "the scene has no sparse points; where the cameras' axes meet stands in for them to find neighbours and depths",
+    );
+    let standing_in = Scene { tracks: made_up, ..scene.clone() };
+    let mut neighbors = select_neighbors(&standing_in, cameras, options)?;
+    // No depth starts from a point that is not there.
+    neighbors.iter_mut().for_each(|n| n.tracks.clear());
+    Ok((neighbors, standing_in.tracks))
 }
 
 /// The neighbours of all views by the default rules: those stored with the scene, else by its sparse points; none where

@@ -78,7 +78,9 @@ fn sparse_points(prepared: &Prepared, view: ViewIndex, camera: &Camera) -> (Vec<
 /// Depths of all sparse points in front of `camera` whose projection is inside its image.
 fn visible_depths<'a>(prepared: &'a Prepared, camera: &'a Camera) -> impl Iterator<Item = f32> + 'a {
     let (width, height) = (camera.size().width as f32, camera.size().height as f32);
-    prepared.loaded.scene.tracks.iter().filter_map(move |(point, _)| {
+    let (sparse, made_up) = (&prepared.loaded.scene.tracks, &prepared.made_up);
+    let tracks = if sparse.is_empty() { made_up } else { sparse };
+    tracks.iter().filter_map(move |(point, _)| {
         let [x, y, depth] = camera.project_f32(point);
         let inside = (0.0..width).contains(&(x / depth)) && (0.0..height).contains(&(y / depth));
         (depth > 0.0 && inside).then_some(depth)

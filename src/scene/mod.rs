@@ -17,6 +17,7 @@ pub(crate) mod synthetic;
 mod tower;
 mod tower_points;
 mod trws;
+mod virtual_points;
 
 pub use cloud::{CloudLayout, CloudPoint, PointCloud, PointSink, PointSource};
 pub use depth_range::{DEFAULT_DEPTH_RANGE, SparseInit, SparsePoint};
@@ -32,3 +33,4 @@ pub use resolution::{ResolutionOptions, scaled_size};
 pub use roi_estimate::{RoiEstimation, estimate_roi};
 pub use tower::looks_like_tower;
 pub use tower_points::{TowerPoints, tower_points};
+pub use virtual_points::virtual_points;

@@ -84,7 +84,12 @@ pub fn tower_points(scene: &Scene) -> Option<TowerPoints> {
 
 /// A number in 0..1 that depends on `i` alone (SplitMix64, Steele 2014).
 fn start_of(i: u64) -> f32 {
-    let mut z = (i + SEED).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    hashed(i + SEED)
+}
+
+/// A number in [0, 1) that looks random and depends on `i` alone.
+pub(super) fn hashed(i: u64) -> f32 {
+    let mut z = i.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ z >> 31) >> 40) as f32 / (1u64 << 24) as f32
