@@ -157,7 +157,7 @@ fn message(event: &Event) -> Option<(i32, String)> {
     Some(match event {
         Event::Warning(text) | Event::Info(text) => (0, printable(text)),
         Event::Detail(text) => (2, printable(text)),
-        Event::SceneLoaded { scene, elapsed } => (0, scene_lines("loaded", "from", scene, elapsed, ":")),
+        Event::SceneLoaded { scene, elapsed } => (0, scene_lines("loaded", "from", scene, elapsed)),
         Event::ImagesPrepared { images, elapsed } => (
             0,
             format!(
@@ -210,16 +210,16 @@ fn message(event: &Event) -> Option<(i32, String)> {
         Event::CloudSaved { path, points, elapsed } => {
             (0, format!("Point-cloud '{}' saved: {points} points ({})", path.display(), time(elapsed)))
         }
-        Event::SceneSaved { scene, elapsed, .. } => (0, scene_lines("saved", "to", scene, elapsed, "")),
+        Event::SceneSaved { scene, elapsed, .. } => (0, scene_lines("saved", "to", scene, elapsed)),
     })
 }
 
 /// The lines about a scene that was read or written; project archives go without the name of a format.
-fn scene_lines(done: &str, to: &str, scene: &SceneSummary, elapsed: &Duration, end: &str) -> String {
+fn scene_lines(done: &str, to: &str, scene: &SceneSummary, elapsed: &Duration) -> String {
     let format = if scene.interface { format!(" {to} interface format") } else { String::new() };
     let SceneSummary { images, calibrated, points, .. } = scene;
     format!(
-        "Scene {done}{format} ({}){end}\n\t{images} images ({calibrated} calibrated)\n\t{points} points, 0 vertices, \
+        "Scene {done}{format} ({}):\n\t{images} images ({calibrated} calibrated)\n\t{points} points, 0 vertices, \
          0 faces",
         duration::text(*elapsed)
     )
@@ -257,6 +257,16 @@ mod tests {
         ] {
             assert_eq!(message(&event).unwrap().1, expected);
         }
+    }
+
+    #[test]
+    fn scenes_are_summed_up_after_a_colon() {
+        let scene = SceneSummary { interface: true, images: 6, calibrated: 6, points: 6344 };
+        let event = Event::SceneSaved { path: "a.mvs".into(), scene, elapsed: Duration::from_millis(1) };
+        assert_eq!(
+            message(&event).unwrap().1,
+            "Scene saved to interface format (1ms):\n\t6 images (6 calibrated)\n\t6344 points, 0 vertices, 0 faces"
+        );
     }
 
     #[test]
