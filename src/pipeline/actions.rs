@@ -1,30 +1,38 @@
 //! Small jobs on a scene without depth maps: its region of interest and neighbour lists as text.
 
-use super::job::SceneJob;
-use super::outputs::summary;
+use super::job::{SceneArchive, SceneJob};
+use super::outputs::{summary, write_archive};
 use super::prepare::load;
 use crate::error::{Error, Result};
 use crate::progress::{Event, Progress};
 use crate::store::atomic::AtomicFile;
-use crate::store::export::{interface_archive, write_interface};
+use crate::store::export::interface_archive;
 use crate::store::import::{LoadedScene, load_scene};
+use crate::store::stored_cloud::{StoredCloud, resaved_archive};
 use semvs_formats::{Limits, mvs, neighbors_file, roi};
 use std::io::Read;
 use std::path::Path;
 use std::time::Instant;
 
-/// Writes the scene with the region of interest in the text file `region` to `path`.
+/// Writes the scene with the region of interest in the text file `region` to `path`, as the archive `kind`.
 ///
 /// # Errors
 /// Unreadable files, a place that cannot be written.
-pub fn import_roi(job: &SceneJob, region: &Path, path: &Path, progress: &Progress) -> Result<()> {
+pub fn import_roi(
+    job: &SceneJob,
+    region: &Path,
+    path: &Path,
+    kind: SceneArchive,
+    progress: &Progress,
+) -> Result<()> {
     let loaded = load(job, progress)?;
     let start = Instant::now();
     let obb = roi::read(region, &Limits::default()).map_err(|e| Error::format(region, e))?;
-    let mut archive = interface_archive(&loaded, &no_cameras(&loaded), &[]);
+    let points = StoredCloud::new(&loaded.archive.points).copied();
+    let mut archive = resaved_archive(&loaded, points, matches!(kind, SceneArchive::Project(_)));
     archive.obb = Some(obb);
-    write_interface(path, &archive)?;
-    let scene = summary(&archive, true);
+    write_archive(path, &archive, kind)?;
+    let scene = summary(&archive, kind == SceneArchive::Interface);
     progress.event(Event::SceneSaved { path: path.to_owned(), scene, elapsed: start.elapsed() });
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Everything from the scene to the dense cloud, in order.
 
+use super::diagnostics::{leave_pictures, leave_project};
 use super::estimate::{Estimation, existing_maps};
 use super::filter::filter_across_views;
 use super::fusing::{Fused, fuse_maps, possible};
@@ -11,7 +12,6 @@ use super::outputs::{
 use super::prepare::{Prepared, load, name_unmatched, pixels_in_hand, prepare};
 use super::record::{Clock, view_rows, with_threads};
 use super::skip::Labels;
-use super::sparse::SparseCloud;
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions, WithNormals};
 use crate::geometry::{Camera, Size};
@@ -24,6 +24,7 @@ use crate::store::cameras::working_cameras;
 use crate::store::cloud::PlyLayout;
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::LoadedScene;
+use crate::store::stored_cloud::StoredCloud;
 use nalgebra::Vector3;
 use semvs_formats::Limits;
 use std::path::Path;
@@ -79,9 +80,15 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
         progress,
     };
     let mapped = estimation.run(&existing)?;
+    let pictures = |stage: &str| match job.pictures {
+        true => leave_pictures(&prepared, &store, &mapped, stage),
+        false => Ok(()),
+    };
+    pictures("")?;
     clock.stage("estimate");
     if let Some(across) = &job.filter.across {
         filter_across_views(&prepared, &store, &mapped, across, &job.filter.options, progress)?;
+        pictures(".filtered")?;
         clock.stage("filter");
     }
     let store = plain_store(&prepared, &job.depth_maps);
@@ -91,9 +98,13 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     } else {
         finish_cloud(job, &fusion, &prepared, &store, &mapped, &mut clock, progress, &mut report)?;
     }
+    if job.pictures {
+        leave_project(&prepared, &job.outputs.cloud)?;
+    }
     report.views = view_rows(&prepared, &store, &mapped, &existing)?;
     depth_map_rows(&prepared, &store, &mapped, &mut report);
-    if job.remove_depth_maps {
+    // Whoever wants depth maps alone keeps them.
+    if job.remove_depth_maps && !job.depth_maps_only {
         mapped.iter().try_for_each(|&view| store.delete(prepared.id(view)))?;
         report.outputs.retain(|output| output.content != DEPTH_MAP);
     }
@@ -160,22 +171,22 @@ fn finish_depth_maps(
     progress: &Progress,
     report: &mut RunReport,
 ) -> Result<()> {
-    let tracks = &prepared.loaded.scene.tracks;
+    let sparse = StoredCloud::new(&prepared.loaded.archive.points);
     progress.event(Event::DepthMapsCompleted {
         maps: mapped.len(),
-        sparse_points: tracks.len(),
+        sparse_points: prepared.loaded.scene.tracks.len(),
         elapsed: clock.elapsed(),
     });
-    if job.outputs.sparse_cloud && !tracks.is_empty() {
+    if job.outputs.sparse_cloud && !sparse.is_empty() {
         let mut outputs = job.outputs.without_labels();
-        if outputs.layout == PlyLayout::Odm {
+        if outputs.layout == PlyLayout::Odm || !sparse.layout().views {
             // Sparse points need not have what it takes.
             outputs.layout = PlyLayout::OpenMvsProject;
         }
-        let written = write_cloud(&outputs, &SparseCloud(tracks), None, progress)?;
+        let written = write_cloud(&outputs, &sparse, None, progress)?;
         report.outputs.extend(cloud_rows(&written, None));
     }
-    write_scene(&job.outputs, prepared, &SparseCloud(tracks), progress)?;
+    write_scene(&job.outputs, prepared, &sparse, progress)?;
     report.outputs.extend(job.outputs.scene_row());
     Ok(())
 }

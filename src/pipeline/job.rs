@@ -106,6 +106,8 @@ pub struct DensifyJob {
     pub resolution: ResolutionOptions,
     /// Folder of the depth maps.
     pub depth_maps: PathBuf,
+    /// Leave pictures and a cloud of every depth map beside it, and a MeshLab project beside the cloud.
+    pub pictures: bool,
     /// Estimation.
     pub stereo: StereoOptions,
     /// Cleaning.

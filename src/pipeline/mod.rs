@@ -4,6 +4,7 @@ mod actions;
 pub mod compare;
 mod convert;
 mod densify;
+mod diagnostics;
 mod estimate;
 mod evaluate;
 mod export;

@@ -133,6 +133,9 @@ pub(super) fn write_scene(
             project_archive(loaded, cameras, neighbors, cloud)?
         }
     };
+    if let Some(masks) = &prepared.masks {
+        masks.enter(&mut archive, &loaded.search.working_folder);
+    }
     if outputs.names_from_scene {
         let folder = path.parent().unwrap_or(Path::new(""));
         relocate_names(&mut archive, &loaded.search.working_folder, folder);

@@ -10,7 +10,8 @@ use crate::store::images::image_size;
 use crate::store::import::LoadedScene;
 use crate::store::labels::{LabelRequest, LabelStore};
 use crate::store::masks::{default_mask_name, load_mask, mask_in_folder};
-use semvs_formats::Limits;
+use crate::store::paths::name_relative_to;
+use semvs_formats::{Limits, mvs};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -97,6 +98,8 @@ impl Labels {
 #[derive(Debug)]
 pub(super) struct Masks {
     ignore: u16,
+    /// Whether the files are those of a folder that was named.
+    in_folder: bool,
     files: Vec<Option<PathBuf>>,
 }
 
@@ -134,7 +137,16 @@ impl Masks {
             }
             files.push(Some(file));
         }
-        Ok(Masks { ignore: job.ignore, files })
+        Ok(Masks { ignore: job.ignore, in_folder: job.folder.is_some(), files })
+    }
+
+    /// Names the masks of a folder that was named in the scene to be written, relative to the working folder.
+    pub(super) fn enter(&self, archive: &mut mvs::Scene, working_folder: &Path) {
+        for (image, file) in archive.images.iter_mut().zip(&self.files).filter(|_| self.in_folder) {
+            if let Some(file) = file {
+                image.mask_name = name_relative_to(file, working_folder).into_bytes();
+            }
+        }
     }
 
     /// The pixels of a view to ignore at `size`; `None` if it has no mask or one that cannot be read, with a

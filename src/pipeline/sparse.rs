@@ -1,7 +1,7 @@
-//! Sparse points and neighbours from files of their own, and the sparse points as a cloud.
+//! Sparse points and neighbours from files of their own.
 
 use crate::error::{Error, Result};
-use crate::scene::{CloudLayout, CloudPoint, PointSource, Scene, Tracks, ViewIndex, override_neighbors};
+use crate::scene::{Scene, Tracks, ViewIndex, override_neighbors};
 use crate::store::import::LoadedScene;
 use semvs_formats::{Limits, mvs, neighbors_file, ply};
 use std::fs::File;
@@ -41,6 +41,8 @@ pub(super) fn replace_points(loaded: &mut LoadedScene, path: &Path) -> Result<()
         normals: cloud.normals,
         colors: cloud.colors,
     };
+    // What is written again has sorted views of images that take part, like the points of a scene.
+    loaded.archive.repair().map_err(|e| Error::format(path, e))?;
     Ok(())
 }
 
@@ -57,23 +59,4 @@ pub(super) fn override_from_file(scene: &mut Scene, path: &Path) -> Result<()> {
         .map(|list| (ViewIndex(list.image), list.neighbors.iter().map(|&n| ViewIndex(n)).collect()))
         .collect();
     override_neighbors(scene, &lists)
-}
-
-/// The sparse points as a cloud with views.
-pub(super) struct SparseCloud<'a>(pub(super) &'a Tracks);
-
-impl PointSource for SparseCloud<'_> {
-    fn layout(&self) -> CloudLayout {
-        CloudLayout { views: true, ..CloudLayout::default() }
-    }
-
-    fn len(&self) -> u64 {
-        self.0.len() as u64
-    }
-
-    fn for_each(&self, visit: &mut dyn FnMut(&CloudPoint<'_>) -> Result<()>) -> Result<()> {
-        self.0
-            .iter()
-            .try_for_each(|(position, views)| visit(&CloudPoint { position, views, ..CloudPoint::default() }))
-    }
 }

@@ -94,7 +94,9 @@ fn import_views(
         let calibration = match import_calibration(archive, image) {
             Some(mut calibration) => {
                 if calibration.size.is_none() {
-                    size_from_file(&mut calibration, container, &search.find(&name));
+                    let stored =
+                        (image.width > 0 && image.height > 0).then(|| Size::new(image.width, image.height));
+                    size_from_file(&mut calibration, container, &search.find(&name), stored);
                 }
                 Some(calibration)
             }
@@ -132,13 +134,19 @@ pub(crate) fn import_calibration(archive: &mvs::Scene, image: &mvs::Image) -> Op
 }
 
 /// Fills in the size of a camera that was stored without one, and undoes the older way of normalising the principal
-/// point, `c / max(w, h)` without half-pixel terms, which files up to version 5 may use.
-fn size_from_file(calibration: &mut Calibration, container: mvs::Container, image: &Path) {
+/// point, `c / max(w, h)` without half-pixel terms, which files up to version 5 may use. `stored`: the working size of a
+/// project archive, which does when the photograph is elsewhere.
+fn size_from_file(
+    calibration: &mut Calibration,
+    container: mvs::Container,
+    image: &Path,
+    stored: Option<Size>,
+) {
     /// A principal point is near 0.5 by the older rule and near 0 by the newer one.
     const OLDER_RULE: f64 = 0.3;
-    let size = match image_size(image) {
-        Ok(size) => size,
-        Err(error) => return warn!("{error}; its size is not in the scene either"),
+    let size = match (image_size(image), stored) {
+        (Ok(size), _) | (Err(_), Some(size)) => size,
+        (Err(error), None) => return warn!("{error}; its size is not in the scene either"),
     };
     calibration.size = Some(size);
     let k = &mut calibration.normalized_k;

@@ -9,6 +9,7 @@ mod cloud_names;
 pub mod colmap;
 mod depth_map;
 pub mod depth_store;
+pub mod diagnostics;
 pub mod export;
 pub mod images;
 pub mod import;

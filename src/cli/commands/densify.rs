@@ -55,6 +55,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         input: resolver.scene(args.scene.clone(), folder.clone())?,
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder },
+        pictures: false,
         stereo: resolver.stereo()?,
         filter: resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?,
         depth_maps_only,

@@ -18,7 +18,7 @@ pub(crate) fn act(typing: &Typing, folder: &Path, job: &DensifyJob, progress: &P
     // Points of a tower are for densification, and for the neighbours that are written as text.
     let input = SceneJob { tower: None, ..job.input.clone() };
     if let (Some(region), Some(scene)) = (place(&actions.import_roi_file), &job.outputs.scene) {
-        pipeline::import_roi(&input, &region, scene, progress)?;
+        pipeline::import_roi(&input, &region, scene, job.outputs.archive, progress)?;
         return Ok(true);
     }
     if let Some(path) = place(&actions.export_roi_file) {

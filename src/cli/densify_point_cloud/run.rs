@@ -129,6 +129,9 @@ fn existing_input(folder: &Path, typed: &Path) -> Result<PathBuf> {
     Err(Error::content(&input, what))
 }
 
+/// Verbosity from which on pictures of the depth maps are left.
+const PICTURES: i32 = 3;
+
 fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) -> Result<DensifyJob> {
     let args = &typing.args;
     let shared = &args.shared;
@@ -151,6 +154,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         input: scene,
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() },
+        pictures: args.verbosity >= PICTURES,
         stereo: resolver.stereo()?,
         filter: resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
         depth_maps_only: shared.estimation.fusion_mode == 1,
