@@ -1,6 +1,7 @@
-//! A folder to work in and the programs to run there.
-#![allow(dead_code, reason = "every test file uses its own part")]
+//! The bundled files, a folder to work in, and the programs to run there.
+#![allow(dead_code, reason = "every test program uses its own part")]
 
+use semvs_formats::{Limits, ply};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,6 +11,12 @@ pub(crate) const SEMVS: &str = env!("CARGO_BIN_EXE_semvs");
 /// The drop-in.
 pub(crate) const DENSIFY: &str = env!("CARGO_BIN_EXE_DensifyPointCloud");
 
+/// Options for depth maps at half the size of the bundled photographs, without a region of interest.
+pub(crate) const SMALL: &str = "--resolution-level 1 --min-resolution 160 --estimate-roi 0";
+/// Options under which nothing is estimated: the maps that exist are fused as they are.
+pub(crate) const FUSE_ONLY: &str =
+    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
+
 /// The bundled scene.
 pub(crate) fn facade6() -> PathBuf {
     fixtures().join("facade6")
@@ -18,6 +25,25 @@ pub(crate) fn facade6() -> PathBuf {
 /// `compat-fixtures/`.
 pub(crate) fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("compat-fixtures")
+}
+
+/// Reference data that is not bundled, if it is there.
+pub(crate) fn shared(relative: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(relative);
+    let found = path.exists();
+    println!("{relative}: {}", if found { "compared" } else { "not there, skipped" });
+    found.then_some(path)
+}
+
+/// The bytes of `path`, decompressed if the name ends in `.zst`.
+pub(crate) fn bytes(path: &Path) -> Vec<u8> {
+    let raw = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    if path.extension().is_some_and(|e| e == "zst") { zstd::decode_all(&raw[..]).unwrap() } else { raw }
+}
+
+/// A cloud file, which may be compressed.
+pub(crate) fn cloud(path: &Path) -> ply::Cloud {
+    ply::read_cloud(bytes(path).as_slice(), &Limits::default()).unwrap()
 }
 
 /// A temporary folder, removed at the end of the test.
@@ -75,14 +101,20 @@ impl Scratch {
         scratch
     }
 
+    /// The same with OpenMVS's filtered depth maps beside the scene.
+    pub(crate) fn with_maps() -> Self {
+        let scratch = Scratch::facade6();
+        scratch.add_maps("post7", ".");
+        scratch
+    }
+
     /// Adds OpenMVS's depth maps of `step` (raw, post3, post7) to `folder`.
     pub(crate) fn add_maps(&self, step: &str, folder: &str) {
         std::fs::create_dir_all(self.path(folder)).unwrap();
         for i in 0..6 {
             let name = format!("depth{i:04}.dmap");
             let packed = facade6().join("openmvs-2.3.0").join(step).join(format!("{name}.zst"));
-            let bytes = zstd::decode_all(std::fs::File::open(packed).unwrap()).unwrap();
-            std::fs::write(self.path(folder).join(name), bytes).unwrap();
+            std::fs::write(self.path(folder).join(name), bytes(&packed)).unwrap();
         }
     }
 
@@ -102,6 +134,12 @@ impl Scratch {
     #[track_caller]
     pub(crate) fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    /// Reads a cloud.
+    #[track_caller]
+    pub(crate) fn cloud(&self, name: &str) -> ply::Cloud {
+        ply::read_cloud(self.read(name).as_slice(), &Limits::default()).unwrap()
     }
 
     /// Changes a file's bytes.

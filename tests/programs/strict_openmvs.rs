@@ -1,31 +1,13 @@
 //! Where OpenMVS is wrong: the right thing by default, its own with --strict-openmvs. And the options of its later
 //! release.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::Scratch;
+use crate::common::{self, FUSE_ONLY, SMALL, Scratch};
 use semvs_formats::Limits;
 use semvs_formats::mvs::{self, SceneFile};
-use semvs_formats::ply;
-
-const SIZE: &str = "--resolution-level 1 --min-resolution 160 --estimate-roi 0";
-const FUSE_ONLY: &str =
-    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
-
-fn with_maps() -> Scratch {
-    let scratch = Scratch::facade6();
-    scratch.add_maps("post7", ".");
-    scratch
-}
-
-fn cloud(scratch: &Scratch, name: &str) -> ply::Cloud {
-    ply::read_cloud(std::fs::File::open(scratch.path(name)).unwrap(), &Limits::default()).unwrap()
-}
 
 #[test]
 fn an_unknown_archive_type_is_refused_or_leaves_a_bare_header() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     scratch
         .densify_point_cloud(&format!("scene.mvs --archive-type 7 {FUSE_ONLY}"))
         .fails_naming(&["--archive-type"]);
@@ -37,12 +19,12 @@ fn an_unknown_archive_type_is_refused_or_leaves_a_bare_header() {
 
 #[test]
 fn a_project_is_densified_or_only_its_cloud_exported() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let dense = common::facade6().join("openmvs-2.3.0/archive3/scene_dense.mvs");
     std::fs::copy(dense, scratch.path("project.mvs")).unwrap();
     let stored = SceneFile::read(scratch.path("project.mvs"), &Limits::default()).unwrap().scene;
     scratch.densify_point_cloud("project.mvs --strict-openmvs").ok();
-    assert_eq!(cloud(&scratch, "project_dense.ply").positions, stored.points.positions);
+    assert_eq!(scratch.cloud("project_dense.ply").positions, stored.points.positions);
     let scene = SceneFile::read(scratch.path("project_dense.mvs"), &Limits::default()).unwrap().scene;
     assert!(scene.points.positions.is_empty() && scene.images.len() == 6);
     let out = scratch.densify_point_cloud(&format!("project.mvs {FUSE_ONLY}")).ok();
@@ -51,10 +33,10 @@ fn a_project_is_densified_or_only_its_cloud_exported() {
 
 #[test]
 fn optimize_in_the_config_counts_or_not() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let untouched = scratch.read("depth0000.dmap");
     scratch.write("Densify.ini", "Optimize = 0\n");
-    let words = format!("scene.mvs {SIZE} --geometric-iters 0 --dense-config-file Densify.ini");
+    let words = format!("scene.mvs {SMALL} --geometric-iters 0 --dense-config-file Densify.ini");
     scratch.densify_point_cloud(&words).ok();
     assert_eq!(scratch.read("depth0000.dmap"), untouched);
     scratch.densify_point_cloud(&format!("{words} --strict-openmvs")).ok();
@@ -63,8 +45,8 @@ fn optimize_in_the_config_counts_or_not() {
 
 #[test]
 fn maps_that_exist_are_made_again_or_refined() {
-    let scratch = with_maps();
-    let words = format!("scene.mvs {SIZE} --geometric-iters 1 --postprocess-dmaps 0 -v 2");
+    let scratch = Scratch::with_maps();
+    let words = format!("scene.mvs {SMALL} --geometric-iters 1 --postprocess-dmaps 0 -v 2");
     let out = scratch.densify_point_cloud(&format!("{words} --strict-openmvs")).ok();
     let log = scratch.files().into_iter().find(|f| f.ends_with(".log")).unwrap();
     let log = String::from_utf8(scratch.read(&log)).unwrap();
@@ -78,7 +60,7 @@ fn maps_that_exist_are_made_again_or_refined() {
 fn an_image_that_cannot_be_read_costs_one_view_or_the_run() {
     let scratch = Scratch::facade6();
     scratch.write("images/0004.jpg", "no image");
-    let words = format!("scene.mvs {SIZE} --geometric-iters 0 --iters 1");
+    let words = format!("scene.mvs {SMALL} --geometric-iters 0 --iters 1");
     scratch.densify_point_cloud(&words).ok();
     scratch.densify_point_cloud(&format!("{words} --strict-openmvs")).fails_naming(&["0004.jpg"]);
     // Depth maps alone: a failure there has no exit code of its own.
@@ -91,7 +73,7 @@ fn an_image_that_cannot_be_read_costs_one_view_or_the_run() {
 
 #[test]
 fn a_cloud_without_points_is_an_error_or_not() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let words = format!("scene.mvs {FUSE_ONLY} --import-roi-file far.txt -o far.mvs");
     scratch.write("far.txt", "1 0 0 0 1 0 0 0 1  9999 9999 9999  1 1 1");
     scratch.densify_point_cloud(&words).ok();
@@ -117,7 +99,7 @@ fn too_little_memory_is_said_before_work_with_the_exit_code_of_a_killed_process(
 
 #[test]
 fn the_size_of_the_process_ends_the_output() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let out = scratch.densify_point_cloud(&format!("scene.mvs -v 0 --process-priority -3 {FUSE_ONLY}")).ok();
     if cfg!(target_os = "linux") {
         let end: Vec<&str> = out.stdout.lines().rev().take(4).map(|l| &l[l.len().min(20)..]).collect();
@@ -128,7 +110,7 @@ fn the_size_of_the_process_ends_the_output() {
 
 #[test]
 fn segmentation_of_openmvs_2_4_labels_points_by_the_masks() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     std::fs::create_dir(scratch.path("masks")).unwrap();
     for name in ["0003", "0004", "0005", "0006", "0012", "0013"] {
         let mask = image::GrayImage::from_fn(400, 300, |x, _| image::Luma([if x < 200 { 2 } else { 5 }]));
@@ -136,7 +118,7 @@ fn segmentation_of_openmvs_2_4_labels_points_by_the_masks() {
     }
     scratch.densify_point_cloud(&format!("scene.mvs -o plain.mvs {FUSE_ONLY}")).ok();
     scratch.densify_point_cloud(&format!("scene.mvs -m masks --estimate-segmentation 2 {FUSE_ONLY}")).ok();
-    let (plain, labelled) = (cloud(&scratch, "plain.ply"), cloud(&scratch, "scene_dense.ply"));
+    let (plain, labelled) = (scratch.cloud("plain.ply"), scratch.cloud("scene_dense.ply"));
     assert_eq!(labelled.positions, plain.positions, "fusion is not changed");
     assert!(
         labelled.labels.iter().all(|l| [2, 5].contains(l))
@@ -144,9 +126,9 @@ fn segmentation_of_openmvs_2_4_labels_points_by_the_masks() {
     );
     scratch.write("masks/labels.json", r#"{"0": "unclassified", "2": "left", "5": "right"}"#);
     scratch.densify_point_cloud(&format!("scene.mvs -m masks --estimate-segmentation 1 {FUSE_ONLY}")).ok();
-    assert!(cloud(&scratch, "scene_dense.ply").comments.iter().any(|c| c.contains("left")));
+    assert!(scratch.cloud("scene_dense.ply").comments.iter().any(|c| c.contains("left")));
     scratch.densify_point_cloud(&format!("scene.mvs -m masks --estimate-segmentation 0 {FUSE_ONLY}")).ok();
-    assert!(cloud(&scratch, "scene_dense.ply").labels.is_empty());
+    assert!(scratch.cloud("scene_dense.ply").labels.is_empty());
 }
 
 /// A scene of 30 cameras that climb around a tower of radius 2, with noise for images.
@@ -200,7 +182,7 @@ fn cameras_that_climb_a_tower_get_points_on_it() {
     std::fs::create_dir(scratch.path("work")).unwrap();
     let words = "-w work --output-view-neighbors-file nb.txt";
     scratch.densify_point_cloud(&format!("../tower.mvs {words}")).ok();
-    let points = cloud(&scratch, "work/tower.ply");
+    let points = scratch.cloud("work/tower.ply");
     assert!(points.len() > 5000 && points.positions.iter().all(|p| p[0].hypot(p[1]) < 2.6));
     let lists = String::from_utf8(scratch.read("work/nb.txt")).unwrap();
     assert_eq!(lists.lines().filter(|l| l.split_whitespace().count() > 2).count(), 30, "{lists}");

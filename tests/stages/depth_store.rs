@@ -1,34 +1,16 @@
 //! Depth maps that OpenMVS wrote, held against the scene that they belong to.
-#![allow(clippy::unwrap_used)]
 
+use crate::common::{Scratch, facade6};
 use semvs::scene::{ImageId, ResolutionOptions};
 use semvs::store::cameras::working_cameras;
 use semvs::store::depth_store::{DepthStore, Existing};
 use semvs::store::import::load_scene;
 use semvs::store::paths::SearchPath;
 use semvs_formats::Limits;
-use std::path::{Path, PathBuf};
-
-fn facade() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("compat-fixtures/facade6")
-}
-
-/// A folder with the decompressed final maps.
-fn unpacked() -> tempfile::TempDir {
-    let scratch = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(facade().join("openmvs-2.3.0/post7")).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap();
-        if let Some(name) = name.strip_suffix(".zst").filter(|name| name.ends_with(".dmap")) {
-            let bytes = zstd::decode_all(std::fs::File::open(&path).unwrap()).unwrap();
-            std::fs::write(scratch.path().join(name), bytes).unwrap();
-        }
-    }
-    scratch
-}
+use std::path::Path;
 
 fn store(folder: &Path) -> DepthStore {
-    let images = SearchPath { working_folder: facade(), scene_folder: facade() };
+    let images = SearchPath { working_folder: facade6(), scene_folder: facade6() };
     DepthStore::new(folder, images, 64 << 20, Limits::default())
 }
 
@@ -37,9 +19,11 @@ const HALF: ResolutionOptions = ResolutionOptions { level: 1, min: 100, max: 256
 
 #[test]
 fn maps_of_openmvs_belong_to_their_scene_and_only_to_its_size() {
-    let scratch = unpacked();
-    let store = store(scratch.path());
-    let scene = load_scene(&facade().join("scene.mvs"), &facade(), &Limits::default()).unwrap();
+    let scratch = Scratch::new();
+    scratch.add_maps("post7", "");
+    let store = store(&scratch.path(""));
+    let scene = load_scene(&facade6().join("scene.mvs"), &facade6(), &Limits::default())
+        .unwrap();
     let cameras = working_cameras(&scene, &HALF, true).unwrap();
     let full = ResolutionOptions { level: 0, ..HALF };
     let large = working_cameras(&scene, &full, true).unwrap();
@@ -60,8 +44,9 @@ fn maps_of_openmvs_belong_to_their_scene_and_only_to_its_size() {
 
 #[test]
 fn maps_of_openmvs_are_written_back_byte_for_byte() {
-    let scratch = unpacked();
-    let (from, to) = (store(scratch.path()), store(&scratch.path().join("copy")));
+    let scratch = Scratch::new();
+    scratch.add_maps("post7", "");
+    let (from, to) = (store(&scratch.path("")), store(&scratch.path("copy")));
     for id in (0..6).map(ImageId) {
         let estimate = from.read(id).unwrap();
         let valid = estimate.depth.data().iter().filter(|&&d| d > 0.0).count();

@@ -1,9 +1,7 @@
 //! The depth filters reproduce OpenMVS 2.3.0 from its own raw maps.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod openmvs_maps;
-
-use openmvs_maps::{depth_maps, facade6, neighbor_lists, scene};
+use crate::common::facade6;
+use crate::openmvs_maps::{depth_maps, neighbor_lists, scene};
 use semvs::depth_filter::{DepthFilterOptions, FilterView, fill_gaps, filter_consistency, remove_speckles};
 use semvs::scene::DepthEstimate;
 

@@ -1,9 +1,6 @@
 //! `semvs import` of depths and `semvs export` of scenes and maps.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::Scratch;
+use crate::common::{self, Scratch};
 use semvs_formats::mvs::{ArchiveKind, Container, SceneFile};
 use semvs_formats::{Limits, dmap::DepthMapFile, neighbors_file, npy, pfm, roi};
 

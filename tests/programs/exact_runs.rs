@@ -1,9 +1,6 @@
 //! The drop-in, given OpenMVS's maps and command lines, writes OpenMVS's maps, scenes and clouds.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::{Scratch, facade6};
+use crate::common::{self, Scratch, bytes, facade6, shared};
 use std::path::{Path, PathBuf};
 
 /// The same points in the same order, each figure on all but one of 10 000 points.
@@ -86,20 +83,15 @@ fn project_archives_of_the_bundled_scene_hold_the_same_cloud() {
 
 /// OpenMVS's own test scene, if it is there, and a folder with its files and its filtered maps.
 fn tests4() -> Option<(PathBuf, Scratch)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/reference/tests4");
-    if !folder.exists() {
-        println!("{}: not there, skipped", folder.display());
-        return None;
-    }
-    println!("{}: compared", folder.display());
+    let folder = shared("reference/tests4")?;
     let scratch = Scratch::new();
     std::fs::create_dir(scratch.path("images")).unwrap();
     scratch.write("scene.mvs", std::fs::read(folder.join("scene.mvs")).unwrap());
     for i in 0..4 {
         let image = format!("images/{i:05}.jpg");
         scratch.write(&image, std::fs::read(folder.join(&image)).unwrap());
-        let map = std::fs::File::open(folder.join(format!("post7/depth{i:04}.dmap.zst"))).unwrap();
-        scratch.write(&format!("depth{i:04}.dmap"), zstd::decode_all(map).unwrap());
+        let map = format!("depth{i:04}.dmap");
+        scratch.write(&map, bytes(&folder.join(format!("post7/{map}.zst"))));
     }
     Some((folder, scratch))
 }

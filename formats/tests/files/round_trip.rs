@@ -1,7 +1,5 @@
 //! Generated scenes and depth maps come back as they were written.
 
-#![allow(clippy::unwrap_used)]
-
 use proptest::collection::vec;
 use proptest::prelude::*;
 use semvs_formats::Limits;

@@ -1,27 +1,15 @@
 //! Loading, view selection and regions of interest against OpenMVS's own outputs.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
+use crate::common::{bytes, facade6, shared};
 use semvs::geometry::Camera;
 use semvs::scene::{NeighborOptions, ResolutionOptions, ViewNeighbors, select_neighbors};
 use semvs::store::cameras::working_cameras;
 use semvs::store::import::{LoadedScene, load_scene};
 use semvs_formats::Limits;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Largest relative difference of a score, scale, angle or area: exp and acos differ between libraries.
 const SCORE_TOLERANCE: f32 = 1e-6;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// A file outside the repository, if it is there.
-fn extra(path: &str) -> Option<PathBuf> {
-    let path = root().join("../shared").join(path);
-    let there = path.exists();
-    println!("{}: {}", path.display(), if there { "compared" } else { "not there, skipped" });
-    there.then_some(path)
-}
 
 fn load(path: &Path) -> LoadedScene {
     load_scene(path, Path::new(""), &Limits::default()).unwrap()
@@ -59,7 +47,7 @@ fn resolution(level: u32, min: u32) -> ResolutionOptions {
 
 #[test]
 fn view_selection_equals_openmvs_on_the_bundled_scene() {
-    let folder = root().join("compat-fixtures/facade6");
+    let folder = facade6();
     let reference = folder.join("openmvs-2.3.0/post7/scene_dense.mvs");
     assert_same_neighbors(&folder.join("scene.mvs"), &reference, &resolution(1, 160));
 }
@@ -67,13 +55,13 @@ fn view_selection_equals_openmvs_on_the_bundled_scene() {
 #[test]
 fn view_selection_equals_openmvs_on_larger_scenes() {
     for name in ["facade16", "fountain_p11"] {
-        let scene = extra(&format!("datasets/{name}/scene.mvs"));
-        let reference = extra(&format!("reference/{name}/scene_dense.mvs"));
+        let scene = shared(&format!("datasets/{name}/scene.mvs"));
+        let reference = shared(&format!("reference/{name}/scene_dense.mvs"));
         if let (Some(scene), Some(reference)) = (scene, reference) {
             assert_same_neighbors(&scene, &reference, &resolution(1, 320));
         }
     }
-    if let Some(folder) = extra("reference/tests4") {
+    if let Some(folder) = shared("reference/tests4") {
         let reference = folder.join("fuse_fuse3/scene_dense.mvs");
         assert_same_neighbors(&folder.join("scene.mvs"), &reference, &ResolutionOptions::default());
     }
@@ -84,8 +72,8 @@ fn densified_scenes_equal_openmvs_to_the_byte() {
     use semvs::store::export::{interface_archive, write_interface};
     let scratch = tempfile::tempdir().unwrap();
     for name in ["facade16", "fountain_p11"] {
-        let scene = extra(&format!("datasets/{name}/scene.mvs"));
-        let Some((scene, reference)) = scene.zip(extra(&format!("reference/{name}/scene_dense.mvs"))) else {
+        let scene = shared(&format!("datasets/{name}/scene.mvs"));
+        let Some((scene, reference)) = scene.zip(shared(&format!("reference/{name}/scene_dense.mvs"))) else {
             return;
         };
         let mut loaded = load(&scene);
@@ -99,7 +87,7 @@ fn densified_scenes_equal_openmvs_to_the_byte() {
 
 #[test]
 fn a_densified_scene_keeps_its_neighbours_and_gets_its_tracks() {
-    let folder = root().join("compat-fixtures/facade6");
+    let folder = facade6();
     let (_, fresh) = select(&load(&folder.join("scene.mvs")), &resolution(1, 160));
     let mut again = load(&folder.join("openmvs-2.3.0/post7/scene_dense.mvs"));
     again.search.scene_folder = folder;
@@ -114,7 +102,7 @@ fn a_densified_scene_keeps_its_neighbours_and_gets_its_tracks() {
 #[test]
 fn one_bad_photograph_drops_its_view_and_strictness_makes_it_an_error() {
     let scratch = tempfile::tempdir().unwrap();
-    let folder = root().join("compat-fixtures/facade6");
+    let folder = facade6();
     std::fs::create_dir(scratch.path().join("images")).unwrap();
     let mut loaded = load(&folder.join("scene.mvs"));
     loaded.search.working_folder = scratch.path().to_owned();
@@ -128,7 +116,8 @@ fn one_bad_photograph_drops_its_view_and_strictness_makes_it_an_error() {
     let cameras = working_cameras(&loaded, &resolution(1, 160), false).unwrap();
     let usable: Vec<bool> = cameras.iter().map(Option::is_some).collect();
     assert_eq!(usable, [true, false, false, true, true, true]);
-    let error = working_cameras(&loaded, &resolution(1, 160), true).unwrap_err().to_string();
+    let error =
+        working_cameras(&loaded, &resolution(1, 160), true).unwrap_err().to_string();
     assert!(error.contains("0004.jpg"), "{error}");
     let neighbors = select_neighbors(&loaded.scene, &cameras, &NeighborOptions::default()).unwrap();
     assert_eq!(neighbors[1], ViewNeighbors::default());
@@ -136,7 +125,8 @@ fn one_bad_photograph_drops_its_view_and_strictness_makes_it_an_error() {
     for i in [3, 4, 5] {
         std::fs::remove_file(scratch.path().join(image(i))).unwrap();
     }
-    let error = working_cameras(&loaded, &resolution(1, 160), false).unwrap_err().to_string();
+    let error =
+        working_cameras(&loaded, &resolution(1, 160), false).unwrap_err().to_string();
     assert!(error.contains("1 of its 6 images") && error.contains("working folder"), "{error}");
 }
 
@@ -145,7 +135,7 @@ fn the_estimated_region_equals_openmvs() {
     use semvs::scene::{RoiEstimation, estimate_roi};
     // Printed by OpenMVS with six decimals.
     const TOLERANCE: f64 = 1e-6;
-    let Some(folder) = extra("reference/tests4") else { return };
+    let Some(folder) = shared("reference/tests4") else { return };
     let scene = load(&folder.join("scene.mvs")).scene;
     assert_eq!(estimate_roi(&scene, RoiEstimation::ObjectScan), None, "the cameras look the same way");
     let roi = estimate_roi(&scene, RoiEstimation::Always).unwrap();
@@ -159,12 +149,12 @@ fn the_estimated_region_equals_openmvs() {
 #[test]
 fn depth_ranges_equal_those_of_openmvs_maps() {
     use semvs::scene::SparseInit;
-    let folder = root().join("compat-fixtures/facade6");
+    let folder = facade6();
     let loaded = load(&folder.join("scene.mvs"));
     let (cameras, views) = select(&loaded, &resolution(1, 160));
     for (i, (camera, view)) in cameras.iter().zip(&views).enumerate() {
         let file = folder.join(format!("openmvs-2.3.0/raw/depth{i:04}.dmap.zst"));
-        let bytes = zstd::decode_all(std::fs::File::open(file).unwrap()).unwrap();
+        let bytes = bytes(&file);
         let f32_at = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         let init = SparseInit::new(&loaded.scene.tracks, &view.tracks, camera.as_ref().unwrap());
         assert_eq!(init.range, (f32_at(20), f32_at(24)), "view {i}");

@@ -1,29 +1,20 @@
 //! Depth maps to clouds without fusion, on the bundled scene.
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+use crate::common::{self, Scratch, facade6};
 use semvs::pipeline::{ConvertJob, LabelJob, Outputs, SceneArchive, convert};
 use semvs::progress::Progress;
 use semvs::semantics::ClassRules;
 use semvs::store::cloud::PlyLayout;
 use semvs::store::depth_store::read_depth_map;
 use semvs::store::labels::LabelSources;
-use semvs_formats::{Limits, ply};
+use semvs_formats::Limits;
 use std::path::{Path, PathBuf};
 
-fn facade() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("compat-fixtures/facade6")
-}
-
-fn unpack(name: &str, folder: &Path) -> PathBuf {
-    let packed = facade().join(format!("openmvs-2.3.0/post7/{name}.zst"));
-    let bytes = zstd::decode_all(std::fs::File::open(packed).unwrap()).unwrap();
-    let path = folder.join(name);
-    std::fs::write(&path, bytes).unwrap();
-    path
-}
-
-fn read(path: &Path) -> ply::Cloud {
-    ply::read_cloud(std::fs::File::open(path).unwrap(), &Limits::default()).unwrap()
+/// A folder with OpenMVS's filtered maps and nothing else.
+fn maps() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.add_maps("post7", "");
+    scratch
 }
 
 fn labels(folder: &Path, classes: &[&str]) -> LabelJob {
@@ -48,7 +39,7 @@ fn job(depth_maps: Vec<PathBuf>, labels: Option<LabelJob>, cloud: &Path) -> Conv
         sparse_cloud: false,
         allow_empty: false,
     };
-    ConvertJob { depth_maps, working_folder: Some(facade()), labels, outputs }
+    ConvertJob { depth_maps, working_folder: Some(facade6()), labels, outputs }
 }
 
 /// Positions go through `f32` twice on the way to a pixel and back.
@@ -58,15 +49,15 @@ const DEPTH_TOLERANCE: f64 = 1e-5;
 
 #[test]
 fn every_depth_becomes_a_point_with_what_its_pixel_has() {
-    let scratch = tempfile::tempdir().unwrap();
-    let map = unpack("depth0003.dmap", scratch.path());
-    let cloud = scratch.path().join("out/x.ply");
-    let mut job = job(vec![map.clone()], Some(labels(&facade().join("labels"), &[])), &cloud);
+    let scratch = maps();
+    let map = scratch.path("depth0003.dmap");
+    let cloud = scratch.path("out/x.ply");
+    let mut job = job(vec![map.clone()], Some(labels(&facade6().join("labels"), &[])), &cloud);
     job.outputs.layout = PlyLayout::OpenMvs;
     convert(&job, &Progress::silent()).unwrap();
-    let points = read(&cloud);
+    let points = common::cloud(&cloud);
     let estimate = read_depth_map(&map, Limits::default()).unwrap();
-    let label_file = facade().join("labels").join(match estimate.image_name.rsplit('/').next().unwrap() {
+    let label_file = facade6().join("labels").join(match estimate.image_name.rsplit('/').next().unwrap() {
         name if name.ends_with(".jpg") => format!("{}_l.png", name.trim_end_matches(".jpg")),
         name => panic!("{name}"),
     });
@@ -110,51 +101,50 @@ fn away_from(normal: [f32; 3], point: [f32; 3], center: &[f64]) -> f64 {
 
 #[test]
 fn several_maps_make_one_cloud_of_the_kept_classes() {
-    let scratch = tempfile::tempdir().unwrap();
-    let depth_maps: Vec<PathBuf> =
-        (0..6).map(|i| unpack(&format!("depth{i:04}.dmap"), scratch.path())).collect();
-    let cloud = scratch.path().join("x.ply");
-    let label_maps = facade().join("labels");
+    let scratch = maps();
+    let depth_maps: Vec<PathBuf> = (0..6).map(|i| scratch.path(&format!("depth{i:04}.dmap"))).collect();
+    let cloud = scratch.path("x.ply");
+    let label_maps = facade6().join("labels");
     let mut all = job(depth_maps, Some(labels(&label_maps, &[])), &cloud);
     all.outputs.split_by_class = true;
     convert(&all, &Progress::silent()).unwrap();
-    let whole = read(&cloud);
+    let whole = common::cloud(&cloud);
     let by_class = |id: u16| whole.labels.iter().filter(|&&l| l == id).count() as u64;
-    let part = |name: &str| read(&scratch.path().join(format!("x.{name}.ply"))).len() as u64;
+    let part = |name: &str| common::cloud(&scratch.path(&format!("x.{name}.ply"))).len() as u64;
     let parts = ["building", "obstacle", "window", "door"].map(part);
     assert_eq!(parts, [1, 3, 4, 5].map(by_class));
     assert!([1, 3, 4, 5].iter().all(|&id| by_class(id) > 100));
     all.labels = Some(labels(&label_maps, &["window", "door"]));
     convert(&all, &Progress::silent()).unwrap();
-    let kept = read(&cloud);
+    let kept = common::cloud(&cloud);
     assert_eq!(kept.len() as u64, by_class(4) + by_class(5));
     assert!(kept.labels.iter().all(|l| [4, 5].contains(l)));
 }
 
 #[test]
 fn without_images_and_labels_points_still_have_their_place() {
-    let scratch = tempfile::tempdir().unwrap();
-    let map = unpack("depth0000.dmap", scratch.path());
-    let cloud = scratch.path().join("x.ply");
-    let job = ConvertJob { working_folder: Some(scratch.path().to_owned()), ..job(vec![map], None, &cloud) };
+    let scratch = maps();
+    let map = scratch.path("depth0000.dmap");
+    let cloud = scratch.path("x.ply");
+    let job = ConvertJob { working_folder: Some(scratch.path("")), ..job(vec![map], None, &cloud) };
     convert(&job, &Progress::silent()).unwrap();
-    let points = read(&cloud);
+    let points = common::cloud(&cloud);
     assert!(points.colors.is_empty() && points.labels.is_empty() && points.len() > 10_000);
 }
 
 #[test]
 fn bad_input_is_named_and_nothing_is_written() {
-    let scratch = tempfile::tempdir().unwrap();
-    let map = unpack("depth0000.dmap", scratch.path());
-    let cloud = scratch.path().join("x.ply");
+    let scratch = maps();
+    let map = scratch.path("depth0000.dmap");
+    let cloud = scratch.path("x.ply");
     let job = job(vec![map.clone()], None, &cloud);
     let error = |job: &ConvertJob| convert(job, &Progress::silent()).unwrap_err().to_string();
     let mut split = job.clone();
     split.outputs.split_by_class = true;
     assert!(error(&split).starts_with("--split-by-class needs labels"));
-    let missing = ConvertJob { depth_maps: vec![scratch.path().join("depth0009.dmap")], ..job.clone() };
+    let missing = ConvertJob { depth_maps: vec![scratch.path("depth0009.dmap")], ..job.clone() };
     assert!(error(&missing).contains("depth0009.dmap"));
-    let elsewhere = ConvertJob { labels: Some(labels(scratch.path(), &[])), ..job.clone() };
+    let elsewhere = ConvertJob { labels: Some(labels(&scratch.path(""), &[])), ..job.clone() };
     assert!(error(&elsewhere).contains("no label map for"));
     let bytes = std::fs::read(&map).unwrap();
     std::fs::write(&map, &bytes[..bytes.len() / 2]).unwrap();

@@ -1,10 +1,8 @@
 //! Fusion reproduces OpenMVS 2.3.0 from its own maps, point for point.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod openmvs_maps;
-
+use crate::common::{cloud, facade6, shared};
+use crate::openmvs_maps::{MapsInMemory, points, scene};
 use nalgebra::{Matrix3, Vector3};
-use openmvs_maps::{MapsInMemory, cloud, facade6, scene, shared};
 use semvs::evaluate::{Tolerance, compare_clouds};
 use semvs::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
 use semvs::geometry::Roi;
@@ -49,7 +47,7 @@ fn fused(maps: &MapsInMemory, options: &FusionOptions) -> (PointCloud, FusionSum
 
 /// Asserts the same points in the same order, on all but one of 10 000 points in each respect.
 fn assert_same_cloud(maps: &MapsInMemory, ours: &PointCloud, theirs: &Cloud, max_color: f64) {
-    let theirs = openmvs_maps::points(theirs);
+    let theirs = points(theirs);
     assert_eq!(ours.len(), theirs.len(), "number of points");
     let cameras = maps.calibrations();
     let c = compare_clouds(ours, &theirs, Some(&cameras), &Tolerance::default()).unwrap();

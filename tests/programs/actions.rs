@@ -1,17 +1,10 @@
 //! What DensifyPointCloud does besides densification: filters and exports of finished clouds, scenes in parts.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::Scratch;
+use crate::common::{self, FUSE_ONLY, Scratch};
 use semvs_formats::Limits;
 use semvs_formats::mvs::{Container, Scene, SceneFile};
 use semvs_formats::ply;
 use std::collections::{BTreeMap, HashSet};
-
-/// Options under which the maps that exist are used as they are, at their size.
-const AS_THEY_ARE: &str =
-    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
 
 /// The dense project archive that OpenMVS wrote, with the images it names.
 fn with_dense_archive() -> Scratch {
@@ -21,18 +14,8 @@ fn with_dense_archive() -> Scratch {
     scratch
 }
 
-fn with_maps() -> Scratch {
-    let scratch = Scratch::facade6();
-    scratch.add_maps("post7", ".");
-    scratch
-}
-
 fn scene(scratch: &Scratch, name: &str) -> Scene {
     SceneFile::read(scratch.path(name), &Limits::default()).unwrap().scene
-}
-
-fn cloud(scratch: &Scratch, name: &str) -> ply::Cloud {
-    ply::read_cloud(std::fs::File::open(scratch.path(name)).unwrap(), &Limits::default()).unwrap()
 }
 
 fn write(scratch: &Scratch, name: &str, scene: &Scene) {
@@ -47,7 +30,7 @@ fn points_that_are_seen_through_are_removed() {
     scratch.densify_point_cloud("scene_dense.mvs --filter-point-cloud -20 --archive-type 3 -v 0").ok();
     let before = scene(&scratch, "scene_dense.mvs");
     let after = scene(&scratch, "scene_dense_dense_filtered.mvs");
-    let ply = cloud(&scratch, "scene_dense_dense_filtered.ply");
+    let ply = scratch.cloud("scene_dense_dense_filtered.ply");
     assert_eq!(ply.positions, after.points.positions);
     assert!(!ply.has_views() && !ply.colors.is_empty() && !ply.normals.is_empty());
     let (all, kept) = (before.points.positions.len(), after.points.positions.len());
@@ -68,7 +51,7 @@ fn points_that_are_seen_through_are_removed() {
     let file = SceneFile::read(scratch.path("scene_dense_dense_filtered.mvs"), &Limits::default()).unwrap();
     assert!(matches!(file.container, Container::Interface { .. }));
     assert_eq!(file.scene.points.positions, after.points.positions);
-    let with_views = cloud(&scratch, "scene_dense_dense_filtered.ply");
+    let with_views = scratch.cloud("scene_dense_dense_filtered.ply");
     assert!(with_views.has_views() && with_views.positions == after.points.positions);
     scratch
         .densify_point_cloud("scene_dense.mvs --filter-point-cloud -20 --archive-type 3 --max-threads 1")
@@ -76,16 +59,16 @@ fn points_that_are_seen_through_are_removed() {
     assert_eq!(scratch.read("scene_dense_dense_filtered.ply"), expected);
     // A milder limit removes more, one that nothing survives is an error.
     scratch.densify_point_cloud("scene_dense.mvs --filter-point-cloud -1 --archive-type 3").ok();
-    assert!(cloud(&scratch, "scene_dense_dense_filtered.ply").len() < kept);
+    assert!(scratch.cloud("scene_dense_dense_filtered.ply").len() < kept);
 }
 
 #[test]
 fn a_cloud_beside_the_scene_can_be_filtered_too() {
-    let scratch = with_maps();
-    scratch.densify_point_cloud(&format!("scene.mvs {AS_THEY_ARE}")).ok();
+    let scratch = Scratch::with_maps();
+    scratch.densify_point_cloud(&format!("scene.mvs {FUSE_ONLY}")).ok();
     let words = "scene_dense.mvs -p scene_dense.ply -o clean.mvs --filter-point-cloud -20";
     scratch.densify_point_cloud(words).ok();
-    let (before, after) = (cloud(&scratch, "scene_dense.ply"), cloud(&scratch, "clean_filtered.ply"));
+    let (before, after) = (scratch.cloud("scene_dense.ply"), scratch.cloud("clean_filtered.ply"));
     assert!(after.len() < before.len() && after.len() > before.len() * 9 / 10);
     assert!(!after.views.weights.is_empty());
 }
@@ -99,7 +82,7 @@ fn well_seen_points_are_exported() {
         .map(|i| before.points.positions[i])
         .collect::<Vec<_>>();
     scratch.densify_point_cloud("scene_dense.mvs --export-number-views 5").ok();
-    let ply = cloud(&scratch, "scene_dense_dense_5views.ply");
+    let ply = scratch.cloud("scene_dense_dense_5views.ply");
     assert_eq!(ply.positions, well_seen);
     assert!(!ply.has_views() && !ply.colors.is_empty());
     assert!(!scratch.has("scene_dense_dense_5views.mvs"));
@@ -110,7 +93,7 @@ fn well_seen_points_are_exported() {
     plain.points.colors.clear();
     write(&scratch, "scene.mvs", &plain);
     scratch.densify_point_cloud("scene.mvs --export-number-views 2").ok();
-    let sparse = cloud(&scratch, "scene_dense_2views.ply");
+    let sparse = scratch.cloud("scene_dense_2views.ply");
     assert!(sparse.colors.iter().all(|c| *c == [255; 3]) && sparse.colors.len() == sparse.len());
     scratch.densify_point_cloud("scene.mvs --export-number-views 99").fails_naming(&["scene.mvs"]);
 }
@@ -119,7 +102,7 @@ fn well_seen_points_are_exported() {
 fn the_scale_of_points_is_the_size_of_a_pixel() {
     let scratch = with_dense_archive();
     scratch.densify_point_cloud("scene_dense.mvs --estimate-scale 2").ok();
-    let ply = cloud(&scratch, "scene_dense_dense_scale.ply");
+    let ply = scratch.cloud("scene_dense_dense_scale.ply");
     let before = scene(&scratch, "scene_dense.mvs");
     assert_eq!(ply.positions, before.points.positions);
     assert_eq!(ply.normals, before.points.normals);
@@ -130,7 +113,7 @@ fn the_scale_of_points_is_the_size_of_a_pixel() {
     assert!((0..ply.len()).all(|i| before.points.views.weights_of(i).contains(&ply.confidence[i])));
     // Sparse points have neither weights nor normals: the number of views, and normals from the points around.
     scratch.densify_point_cloud("scene.mvs --estimate-scale 1").ok();
-    let sparse = cloud(&scratch, "scene_dense_scale.ply");
+    let sparse = scratch.cloud("scene_dense_scale.ply");
     let scene = scene(&scratch, "scene.mvs");
     for i in 0..sparse.len() {
         assert_eq!(sparse.confidence[i], scene.points.views.images_of(i).len() as f32);
@@ -141,7 +124,7 @@ fn the_scale_of_points_is_the_size_of_a_pixel() {
 
 #[test]
 fn clouds_that_do_not_know_their_views_are_refused() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let mut bare = scene(&scratch, "scene.mvs");
     bare.points = Default::default();
     write(&scratch, "bare.mvs", &bare);
@@ -162,9 +145,9 @@ fn cells(cloud: &ply::Cloud) -> HashSet<[i32; 3]> {
 
 #[test]
 fn parts_of_a_scene_together_give_the_whole_cloud() {
-    let scratch = with_maps();
-    scratch.densify_point_cloud(&format!("scene.mvs -o whole.mvs --number-views-fuse 2 {AS_THEY_ARE}")).ok();
-    let whole = cloud(&scratch, "whole.ply");
+    let scratch = Scratch::with_maps();
+    scratch.densify_point_cloud(&format!("scene.mvs -o whole.mvs --number-views-fuse 2 {FUSE_ONLY}")).ok();
+    let whole = scratch.cloud("whole.ply");
     let parent = scene(&scratch, "scene.mvs");
     // The maps have 3 000 samples of about 0.1 each.
     for area in ["120", "60"] {
@@ -190,10 +173,9 @@ fn parts_of_a_scene_together_give_the_whole_cloud() {
                 let views = scene.points.views.images_of(point);
                 assert!(views.len() >= 2 && views.iter().all(|&v| (v as usize) < scene.images.len()));
             }
-            let out =
-                scratch.densify_point_cloud(&format!("{part} {AS_THEY_ARE} --number-views-fuse 2")).ok();
+            let out = scratch.densify_point_cloud(&format!("{part} {FUSE_ONLY} --number-views-fuse 2")).ok();
             assert!(!out.stdout.contains("estimated again"), "{}", out.stdout);
-            let fused = cloud(&scratch, &part.replace(".mvs", "_dense.ply"));
+            let fused = scratch.cloud(&part.replace(".mvs", "_dense.ply"));
             assert!(fused.len() < whole.len() * 3 / 2 && !fused.is_empty());
             together.extend(cells(&fused));
         }
@@ -206,7 +188,7 @@ fn parts_of_a_scene_together_give_the_whole_cloud() {
 
 #[test]
 fn a_scene_that_is_small_enough_is_not_split() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let before = scratch.files().len();
     scratch.densify_point_cloud("scene.mvs --sub-scene-area 660000").ok();
     assert_eq!(scratch.files().len(), before + 1, "but for the log");
@@ -222,7 +204,7 @@ fn one_neighbour_each_is_chosen_for_all_images_together() {
     let out = scratch.densify_point_cloud(&format!("{words} --max-threads 2")).ok();
     assert!(out.stdout.contains("paired with 1 views") && !out.stdout.contains("paired with 2 views"));
     let first = scratch.read("scene_dense.ply");
-    assert!(cloud(&scratch, "scene_dense.ply").len() > 1000);
+    assert!(scratch.cloud("scene_dense.ply").len() > 1000);
     for old in scratch.files().iter().filter(|f| f.ends_with(".dmap")) {
         std::fs::remove_file(scratch.path(old)).unwrap();
     }

@@ -1,9 +1,7 @@
 //! The unbiased filter against exact depths, on OpenMVS's own raw maps of the bundled scene.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod openmvs_maps;
-
-use openmvs_maps::{bytes, depth_maps, facade6, neighbor_lists, scene};
+use crate::common::{bytes, facade6};
+use crate::openmvs_maps::{depth_maps, neighbor_lists, scene};
 use semvs::depth_filter::{FilterView, UnbiasedFilterOptions, filter_unbiased};
 use semvs::scene::DepthEstimate;
 

@@ -1,10 +1,6 @@
 //! MVSI interface archives: real and synthetic files of every version.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{damage, fixture, shared, small_limits};
+use crate::common::{self, damage, fixture, shared, small_limits};
 use semvs_formats::mvs::{self, Container, NO_ID, Scene, SceneFile};
 use semvs_formats::{Error, Limits};
 

@@ -1,17 +1,11 @@
 //! Whole runs on the bundled scene: the same bytes for any number of threads, labels, resuming, companions.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::Scratch;
+use crate::common::{FUSE_ONLY, SMALL, Scratch};
 use semvs_formats::Limits;
 use semvs_formats::dmap::DepthMapFile;
-use semvs_formats::ply::{Cloud, read_cloud};
+use semvs_formats::ply::Cloud;
 use std::collections::BTreeMap;
 
-const SMALL: &str = "--resolution-level 1 --min-resolution 160 --estimate-roi 0";
-const FUSE_ONLY: &str =
-    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
 const LABELS: &str = "--label-path labels --class-table 3dom-facade";
 
 /// All files below `folder` but logs.
@@ -22,10 +16,6 @@ fn outputs(scratch: &Scratch, folder: &str) -> BTreeMap<String, Vec<u8>> {
         .filter(|f| f.starts_with(&format!("{folder}/")) && !f.ends_with(".log"))
         .map(|f| (f[folder.len() + 1..].to_owned(), scratch.read(&f)))
         .collect()
-}
-
-fn cloud(scratch: &Scratch, name: &str) -> Cloud {
-    read_cloud(scratch.read(name).as_slice(), &Limits::default()).unwrap()
 }
 
 #[test]
@@ -48,7 +38,7 @@ fn every_byte_is_the_same_for_any_number_of_threads() {
             assert!(*bytes == other[name], "{name} differs with {threads} threads");
         }
     }
-    let points = cloud(&scratch, "a/x.ply").len();
+    let points = scratch.cloud("a/x.ply").len();
     assert!(points > 10_000, "{points}");
 }
 
@@ -58,7 +48,7 @@ fn labels_that_decide_nothing_change_no_geometry() {
     scratch.semvs(&format!("densify scene.mvs -w plain -o plain/x.ply {SMALL}")).ok();
     let off = "--label-consistency off";
     scratch.semvs(&format!("densify scene.mvs -w labelled -o labelled/x.ply {SMALL} {LABELS} {off}")).ok();
-    let (plain, labelled) = (cloud(&scratch, "plain/x.ply"), cloud(&scratch, "labelled/x.ply"));
+    let (plain, labelled) = (scratch.cloud("plain/x.ply"), scratch.cloud("labelled/x.ply"));
     assert_eq!(labelled.labels.len(), plain.len());
     assert_eq!(
         plain,
@@ -82,16 +72,16 @@ fn classes_are_kept_and_dropped_as_asked() {
     let report = "--report run.json --split-by-class --color-by-label";
     let run = |words: &str| scratch.semvs(&format!("densify scene.mvs {FUSE_ONLY} {LABELS} {words}")).ok();
     let out = run(&format!("-o kept.ply --exclude-classes sky,obstacle {report}"));
-    let kept = cloud(&scratch, "kept.ply");
+    let kept = scratch.cloud("kept.ply");
     assert!(kept.labels.iter().all(|l| ![2, 3].contains(l)));
     for class in [1, 4, 5] {
         assert!(kept.labels.contains(&class), "class {class}");
     }
     assert!(kept.comments.iter().any(|c| c == "class 1 building 0 0 255"), "{:?}", kept.comments);
     let parts = ["building", "window", "door", "void"].map(|c| format!("kept.{c}.ply"));
-    let parts: usize = parts.iter().filter(|p| scratch.has(p)).map(|p| cloud(&scratch, p).len()).sum();
+    let parts: usize = parts.iter().filter(|p| scratch.has(p)).map(|p| scratch.cloud(p).len()).sum();
     assert_eq!(parts, kept.len());
-    let colored = cloud(&scratch, "kept.labels.ply");
+    let colored = scratch.cloud("kept.labels.ply");
     let window = colored.labels.iter().position(|&l| l == 4).unwrap();
     assert_eq!(colored.colors[window], [0, 255, 0]);
     assert!(out.stdout.contains("building"), "{}", out.stdout);
@@ -125,17 +115,17 @@ fn classes_are_kept_and_dropped_as_asked() {
     }
 
     let out = run("-o kept.ply --classes building,sky,window --exclude-classes sky,window");
-    assert!(cloud(&scratch, "kept.ply").labels.iter().all(|&l| l == 1));
+    assert!(scratch.cloud("kept.ply").labels.iter().all(|&l| l == 1));
     let stale = ["earlier run", "kept.building.ply", "kept.labels.ply", "kept.window.ply"];
     assert!(stale.iter().all(|name| out.stderr.contains(name)), "{}", out.stderr);
     assert!(scratch.has("kept.window.ply"));
 
     run("-o only.ply --classes window --label-consistency strict");
-    assert!(cloud(&scratch, "only.ply").labels.iter().all(|&l| l == 4));
+    assert!(scratch.cloud("only.ply").labels.iter().all(|&l| l == 4));
     // Each mode is stricter than the one before.
     let points = |mode: &str| {
         run(&format!("-o {mode}.ply --label-consistency {mode}"));
-        cloud(&scratch, &format!("{mode}.ply")).len()
+        scratch.cloud(&format!("{mode}.ply")).len()
     };
     let counts = ["off", "support", "strict"].map(points);
     assert!(counts[0] >= counts[1] && counts[1] > counts[2], "{counts:?}");
@@ -214,7 +204,7 @@ fn a_run_leaves_its_results_and_nothing_else() {
     expected.sort();
     let after: Vec<String> = scratch.files().into_iter().filter(|f| !f.ends_with(".log")).collect();
     assert_eq!(after, expected);
-    let dense = cloud(&scratch, "scene_dense.ply");
+    let dense = scratch.cloud("scene_dense.ply");
     assert!(dense.has_views() && dense.len() > 1000);
 }
 

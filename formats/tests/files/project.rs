@@ -1,12 +1,8 @@
 //! Native project archives: real and synthetic files of every kind.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::io::Read;
 
-use common::{damage, fixture, shared, small_limits};
+use crate::common::{damage, fixture, shared, small_limits};
 use semvs_formats::mvs::{self, ArchiveKind, Container, Scene, SceneFile};
 use semvs_formats::{Error, Limits};
 

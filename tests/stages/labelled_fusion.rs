@@ -1,9 +1,7 @@
 //! Label maps to labelled clouds on disk: store, policy, fusion and writer together, on OpenMVS's own depth maps.
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod openmvs_maps;
-
-use openmvs_maps::{MapsInMemory, bytes, facade6, scene};
+use crate::common::{bytes, facade6};
+use crate::openmvs_maps::{MapsInMemory, scene};
 use semvs::evaluate::{CloudScoreOptions, CloudScores, LabelledPoints, cloud_scores};
 use semvs::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
 use semvs::progress::Progress;

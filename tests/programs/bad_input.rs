@@ -1,15 +1,8 @@
 //! Bad input ends in one clear line and exit code 1: no panic, nothing half-written, nothing lost.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::Scratch;
+use crate::common::{self, FUSE_ONLY, SMALL, Scratch};
 use semvs_formats::Limits;
 use semvs_formats::mvs::{self, NEWEST_VERSION, Scene};
-
-const SMALL: &str = "--resolution-level 1 --min-resolution 160 --estimate-roi 0";
-const FUSE_ONLY: &str =
-    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
 
 /// The scene with a change.
 fn changed(change: impl FnOnce(&mut Scene)) -> Scratch {

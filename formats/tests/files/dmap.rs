@@ -1,10 +1,6 @@
 //! Depth maps: real and synthetic files.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{damage, fixture, shared, small_limits};
+use crate::common::{damage, fixture, shared, small_limits};
 use semvs_formats::dmap::{self, DepthMapFile};
 use semvs_formats::{Error, Limits};
 

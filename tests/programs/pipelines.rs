@@ -1,9 +1,6 @@
 //! The command lines of programs that call DensifyPointCloud.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::{DENSIFY, Scratch};
+use crate::common::{DENSIFY, Scratch};
 use semvs_formats::Limits;
 use semvs_formats::mvs::{ArchiveKind, Container, SceneFile};
 

@@ -1,8 +1,6 @@
 //! Region-of-interest and view-neighbour text files of the corpus.
 
-mod common;
-
-use common::{damage, fixture};
+use crate::common::{damage, fixture};
 use semvs_formats::{neighbors_file, roi};
 
 #[test]

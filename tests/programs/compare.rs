@@ -1,9 +1,6 @@
 //! `semvs compare`: what it reports, limits, exit codes.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::{Outcome, Scratch, facade6};
+use crate::common::{self, Outcome, Scratch, facade6};
 use serde_json::Value;
 
 fn openmvs(path: &str) -> String {

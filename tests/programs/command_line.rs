@@ -1,25 +1,11 @@
 //! What the programs accept, refuse and say: spellings, names of outputs, exit codes, help.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
-mod common;
-
-use common::{DENSIFY, SEMVS, Scratch};
+use crate::common::{self, DENSIFY, FUSE_ONLY, SEMVS, Scratch};
 use semvs_formats::mvs::{ArchiveKind, Container, Image, SceneFile};
 use std::path::Path;
 
-/// Options under which nothing is estimated: the maps that exist are fused as they are.
-const FUSE_ONLY: &str =
-    "--resolution-level 1 --min-resolution 160 --estimate-roi 0 --geometric-iters 0 --postprocess-dmaps 0";
-
 /// Points of OpenMVS's own fusion of the same maps.
 const POST7_POINTS: u64 = 24_171;
-
-/// The scene with OpenMVS's filtered maps beside it.
-fn with_maps() -> Scratch {
-    let scratch = Scratch::facade6();
-    scratch.add_maps("post7", ".");
-    scratch
-}
 
 fn points_in(scratch: &Scratch, cloud: &str) -> u64 {
     let bytes = scratch.read(cloud);
@@ -103,7 +89,7 @@ fn the_drop_in_without_input_lists_its_options_or_fails() {
 
 #[test]
 fn help_with_an_input_still_runs() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let out = scratch.densify_point_cloud(&format!("scene.mvs -h {FUSE_ONLY}")).ok();
     assert!(out.stdout.contains("Available options"));
     assert_eq!(points_in(&scratch, "scene_dense.ply"), POST7_POINTS);
@@ -129,7 +115,7 @@ fn what_is_not_available_is_refused_by_name_before_work() {
 
 #[test]
 fn every_option_of_openmvs_works_in_all_spellings() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     scratch.write("nb.txt", "0 1 2\n");
     scratch.write("my.cfg", "iters = 2\n");
     // Estimation is not needed to see that an option is taken.
@@ -188,7 +174,7 @@ fn output_names_are_openmvs_own() {
         ("-o dense.mvs", "dense"),
         ("-o new/folder.x/dense", "new/folder.x/dense"),
     ] {
-        let scratch = with_maps();
+        let scratch = Scratch::with_maps();
         scratch.densify_point_cloud(&format!("scene.mvs {words} {FUSE_ONLY}")).ok();
         assert_eq!(points_in(&scratch, &format!("{base}.ply")), POST7_POINTS, "{words}");
         assert!(scratch.has(&format!("{base}.mvs")), "{words}");
@@ -201,7 +187,7 @@ fn output_names_are_openmvs_own() {
 fn project_archives_hold_the_dense_cloud_as_openmvs_stores_it() {
     let folder = common::facade6().join("openmvs-2.3.0");
     for (kind, reference) in [(0, "archive3"), (1, "archive3"), (2, "archive2"), (3, "archive3")] {
-        let scratch = with_maps();
+        let scratch = Scratch::with_maps();
         let out = scratch.densify_point_cloud(&format!("scene.mvs --archive-type {kind} {FUSE_ONLY}")).ok();
         let saved = out.stdout.lines().find(|line| line.contains("Scene saved")).unwrap();
         assert!(!saved.contains("interface"), "{saved}");
@@ -228,7 +214,7 @@ fn project_archives_hold_the_dense_cloud_as_openmvs_stores_it() {
 
 #[test]
 fn opendronemaps_point_filter_can_read_its_layout() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     scratch.densify_point_cloud(&format!("scene.mvs --ply-layout odm {FUSE_ONLY}")).ok();
     let bytes = scratch.read("scene_dense.ply");
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap();
@@ -264,7 +250,7 @@ fn the_working_folder_is_the_base_of_relative_paths() {
 
 #[test]
 fn options_come_from_command_line_then_config_file() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     scratch
         .write("DensifyPointCloud.cfg", "number-views-fuse = 2 # as in fuse2\noutput-file = from_config\n");
     scratch.densify_point_cloud(&format!("scene.mvs {FUSE_ONLY}")).ok();
@@ -277,7 +263,7 @@ fn options_come_from_command_line_then_config_file() {
 
 #[test]
 fn the_dense_config_file_is_read_and_its_filters_count_unless_typed() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let untouched = scratch.read("depth0000.dmap");
     scratch.write("Densify.ini", "Optimize = 0\nMin Views Filter = 1\n");
     let words = FUSE_ONLY.replace(" --postprocess-dmaps 0", " --dense-config-file Densify.ini");
@@ -291,7 +277,7 @@ fn the_dense_config_file_is_read_and_its_filters_count_unless_typed() {
 
 #[test]
 fn lines_that_callers_look_for_are_printed_and_logged() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let out = scratch.densify_point_cloud(&format!("scene.mvs -v 0 {FUSE_ONLY}")).ok();
     let log = scratch.files().into_iter().find(|f| f.ends_with(".log")).unwrap();
     let log = String::from_utf8(scratch.read(&log)).unwrap();
@@ -318,7 +304,7 @@ fn lines_that_callers_look_for_are_printed_and_logged() {
 
 #[test]
 fn depth_maps_alone_are_announced_with_the_sparse_points() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let out = scratch.densify_point_cloud(&format!("scene.mvs --fusion-mode 1 {FUSE_ONLY}")).ok();
     assert!(out.stdout.contains("Densifying point-cloud completed: 6344 points ("));
     assert_eq!(points_in(&scratch, "scene_dense.ply"), 6344);
@@ -380,7 +366,7 @@ fn logs_go_to_stderr_and_can_be_silenced() {
 
 #[test]
 fn an_input_scene_is_never_replaced_by_semvs() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     let before = scratch.read("scene.mvs");
     scratch.semvs(&format!("densify scene.mvs -o scene.ply {FUSE_ONLY}")).fails_naming(&["--output"]);
     assert_eq!(scratch.read("scene.mvs"), before);
@@ -389,7 +375,7 @@ fn an_input_scene_is_never_replaced_by_semvs() {
 
 #[test]
 fn files_are_inspected_for_people_and_programs() {
-    let scratch = with_maps();
+    let scratch = Scratch::with_maps();
     for (file, kind, needle) in [
         ("scene.mvs", "scene", "calibrated: 6"),
         ("depth0000.dmap", "depth-map", "size: 200 150"),

@@ -1,30 +1,21 @@
 //! Scores equal those of an independent script (numpy and scipy: one k-d tree, one dilation) on real clouds and maps.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
 
+use crate::common::{self, bytes, facade6};
 use semvs::evaluate::{
     CloudScoreOptions, LabelledPoints, MapScoreOptions, MapScores, cloud_scores, map_scores,
 };
 use semvs::geometry::Size;
 use semvs::scene::{DepthMap, Grid};
+use semvs_formats::Limits;
 use semvs_formats::dmap::DepthMapFile;
-use semvs_formats::{Limits, ply};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The script prints five decimals; ours may round the other way.
 const TOLERANCE: f64 = 1.01e-5;
 
-fn facade6() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("compat-fixtures/facade6")
-}
-
-fn bytes(path: &Path) -> Vec<u8> {
-    let raw = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    if path.extension().is_some_and(|e| e == "zst") { zstd::decode_all(&raw[..]).unwrap() } else { raw }
-}
-
 fn cloud(path: &Path) -> LabelledPoints {
-    let cloud = ply::read_cloud(bytes(path).as_slice(), &Limits::default()).unwrap();
+    let cloud = common::cloud(path);
     LabelledPoints {
         positions: cloud.positions.iter().map(|p| p.map(f64::from)).collect(),
         labels: (!cloud.labels.is_empty()).then_some(cloud.labels),

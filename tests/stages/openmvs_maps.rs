@@ -1,6 +1,6 @@
-//! OpenMVS's own maps, neighbour lists and clouds, for the tests of the stages that must reproduce it.
-#![allow(dead_code)]
+//! OpenMVS's own maps and neighbour lists, for the tests of the stages that must reproduce it.
 
+use crate::common::bytes;
 use nalgebra::{Matrix3, Vector3};
 use semvs::Result;
 use semvs::fusion::{FusionMaps, FusionView, MapInfo, MapSource};
@@ -13,27 +13,8 @@ use semvs::store::images::load_working_color;
 use semvs_formats::dmap::DepthMapFile;
 use semvs_formats::mvs::{self, Scene};
 use semvs_formats::{Limits, ply};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
-
-/// The bundled scene.
-pub(crate) fn facade6() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("compat-fixtures/facade6")
-}
-
-/// A folder of reference data that is not bundled, if it is there.
-pub(crate) fn shared(relative: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(relative);
-    let found = path.exists();
-    println!("{relative}: {}", if found { "compared" } else { "not there, skipped" });
-    found.then_some(path)
-}
-
-/// The bytes of `path`, decompressed if the name ends in `.zst`.
-pub(crate) fn bytes(path: &Path) -> Vec<u8> {
-    let raw = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    if path.extension().is_some_and(|e| e == "zst") { zstd::decode_all(&raw[..]).unwrap() } else { raw }
-}
 
 /// The depth maps `depthNNNN.dmap.zst` of a folder, by index.
 pub(crate) fn depth_maps(folder: &Path) -> Vec<DepthEstimate> {
@@ -72,11 +53,6 @@ pub(crate) fn scene(path: &Path) -> Scene {
 /// The neighbour lists of a scene, best first. None of the scenes here has more than the filters and fusion retain.
 pub(crate) fn neighbor_lists(scene: &Scene) -> Vec<Vec<ViewIndex>> {
     scene.images.iter().map(|image| image.view_scores.iter().map(|s| ViewIndex(s.image)).collect()).collect()
-}
-
-/// A cloud.
-pub(crate) fn cloud(path: &Path) -> ply::Cloud {
-    ply::read_cloud(&bytes(path)[..], &Limits::default()).unwrap()
 }
 
 /// Maps of all views in memory.

@@ -1,0 +1,16 @@
+//! The programs as their users run them: what is typed, what is written, what is said, how it ends.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, reason = "tests may")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod actions;
+mod bad_input;
+mod colmap;
+mod command_line;
+mod compare;
+mod exact_runs;
+mod exchange;
+mod pipelines;
+mod runs;
+mod strict_openmvs;
