@@ -1,9 +1,9 @@
 //! Scores of a cloud against a ground-truth cloud.
 
 use super::labels::{LabelScores, label_scores};
-use super::nearest::{Nearest, NearestIndex};
 use super::{rounded, rounded_option};
 use crate::error::{Error, Result};
+use crate::geometry::{Nearest, NearestIndex};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;

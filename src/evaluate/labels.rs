@@ -1,8 +1,8 @@
 //! How well the labels of a cloud agree with those of the truth.
 
 use super::cloud::{LabelledPoints, distance};
-use super::nearest::Nearest;
 use super::rounded_option;
+use crate::geometry::Nearest;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 

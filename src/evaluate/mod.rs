@@ -4,7 +4,6 @@ mod cloud;
 mod compare;
 mod labels;
 mod maps;
-mod nearest;
 
 pub use cloud::{
     ClassScore, ClassScores, CloudScoreOptions, CloudScores, DistanceScore, LabelledPoints, cloud_scores,

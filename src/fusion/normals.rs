@@ -1,14 +1,13 @@
 //! Normals of a finished cloud from the points around each point.
 
 use crate::error::{Error, Result};
+use crate::geometry::NearestIndex;
 use crate::scene::{CloudLayout, CloudPoint, PointSource};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use std::num::NonZeroUsize;
 
 /// Points that define a normal, the point itself included.
-const NEIGHBORS: NonZeroUsize = NonZeroUsize::new(16).unwrap();
+const NEIGHBORS: usize = 16;
 
 /// A cloud whose points have been given normals.
 pub struct WithNormals<'a> {
@@ -40,14 +39,13 @@ impl<'a> WithNormals<'a> {
         if positions.is_empty() {
             return Ok(WithNormals { cloud, normals: Vec::new() });
         }
-        let tree = ImmutableKdTree::new_from_slice(&positions)
-            .map_err(|e| Error::invalid(format!("normals after fusion: cannot index the points: {e}")))?;
+        let index = NearestIndex::new(&positions);
         let normals = positions
             .par_iter()
             .zip(&cameras)
             .map(|(position, &camera)| {
-                let nearest = tree.query(position).nearest_n::<SquaredEuclidean<f64>>(NEIGHBORS).execute();
-                let normal = plane_normal(nearest.iter().map(|n| Vector3::from(positions[n.item as usize])));
+                let nearest = index.nearest_n(position, NEIGHBORS);
+                let normal = plane_normal(nearest.iter().map(|n| Vector3::from(positions[n.index as usize])));
                 let to_camera = centers.get(camera).map_or(-Vector3::z(), |c| c - Vector3::from(*position));
                 let facing = if normal.dot(&to_camera) < 0.0 { -normal } else { normal };
                 facing.map(|v| v as f32).into()

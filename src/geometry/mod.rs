@@ -1,11 +1,13 @@
-//! Cameras, planes and boxes. Knows no files and no scenes.
+//! Cameras, boxes, nearest points. Knows no files and no scenes.
 
 mod camera;
 mod lens;
+mod nearest;
 mod roi;
 mod similarity;
 
 pub use camera::{Camera, Size, normalized_k};
 pub(crate) use lens::Lens;
+pub(crate) use nearest::{Nearest, NearestIndex};
 pub use roi::Roi;
 pub use similarity::is_similar_depth;

@@ -5,7 +5,7 @@ use super::{
     distance, relative,
 };
 use crate::error::Result;
-use crate::evaluate::nearest::NearestIndex;
+use crate::geometry::NearestIndex;
 use crate::scene::{Calibration, CloudLayout, CloudPoint, PointCloud, PointSource};
 use nalgebra::Vector3;
 

@@ -25,7 +25,7 @@ struct Node {
     axis: u8,
 }
 
-/// The best point so far: squared distance and position in the slice that the index was built from.
+/// A point that was found.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(crate) struct Nearest {
     /// Squared distance.
@@ -62,14 +62,24 @@ impl NearestIndex {
 
     /// The point nearest to `query` among those nearer than `radius`.
     pub(crate) fn nearest_within(&self, query: &[f64; 3], radius: f64) -> Option<Nearest> {
+        let mut best = Nearest { squared: radius * radius, index: u32::MAX };
+        self.search(query, &mut best);
+        (best.index != u32::MAX).then_some(best)
+    }
+
+    /// The `count` points nearest to `query`, nearest first; fewer if there are no more.
+    pub(crate) fn nearest_n(&self, query: &[f64; 3], count: usize) -> Vec<Nearest> {
+        let mut several = Several { count, found: Vec::with_capacity(count + 1) };
+        self.search(query, &mut several);
+        several.found
+    }
+
+    fn search(&self, query: &[f64; 3], kept: &mut impl Keep) {
         // distance to the box of all points, per axis
         let offsets = std::array::from_fn(|k| (self.min[k] - query[k]).max(query[k] - self.max[k]).max(0.0));
-        let mut search =
-            Search { query, offsets, best: Nearest { squared: radius * radius, index: u32::MAX } };
-        if !self.points.is_empty() && squared_length(&offsets) < search.best.squared {
-            search.descend(&self.points, &self.nodes, self.levels);
+        if !self.points.is_empty() && squared_length(&offsets) < kept.limit() {
+            Search { query, offsets, kept }.descend(&self.points, &self.nodes, self.levels);
         }
-        (search.best.index != u32::MAX).then_some(search.best)
     }
 }
 
@@ -100,23 +110,61 @@ fn build(points: &mut [([f64; 3], u32)], nodes: &mut [Node], (min, max): ([f64; 
     }
 }
 
-struct Search<'a> {
+/// What a search keeps of the points it meets.
+trait Keep {
+    /// Squared distance beyond which no point is wanted.
+    fn limit(&self) -> f64;
+    /// Keeps a point, if it is wanted.
+    fn offer(&mut self, candidate: Nearest);
+}
+
+impl Keep for Nearest {
+    fn limit(&self) -> f64 {
+        self.squared
+    }
+
+    fn offer(&mut self, candidate: Nearest) {
+        let known = self.index != u32::MAX;
+        if candidate.squared < self.squared || (known && candidate < *self) {
+            *self = candidate;
+        }
+    }
+}
+
+/// The nearest points so far, nearest first.
+struct Several {
+    count: usize,
+    found: Vec<Nearest>,
+}
+
+impl Keep for Several {
+    fn limit(&self) -> f64 {
+        let last = self.count.checked_sub(1).map(|last| self.found.get(last));
+        last.map_or(0.0, |last| last.map_or(f64::INFINITY, |nearest| nearest.squared))
+    }
+
+    fn offer(&mut self, candidate: Nearest) {
+        if candidate.squared.is_finite() && candidate.squared <= self.limit() {
+            let at = self.found.partition_point(|nearer| *nearer < candidate);
+            self.found.insert(at, candidate);
+            self.found.truncate(self.count);
+        }
+    }
+}
+
+struct Search<'a, K> {
     query: &'a [f64; 3],
     /// Distance along each axis to the box that is being searched.
     offsets: [f64; 3],
-    best: Nearest,
+    kept: &'a mut K,
 }
 
-impl Search<'_> {
+impl<K: Keep> Search<'_, K> {
     fn descend(&mut self, points: &[([f64; 3], u32)], nodes: &[Node], levels: u32) {
         let (Some((node, below)), true) = (nodes.split_first(), levels > 0) else {
             for (point, index) in points {
                 let squared = squared_length(&std::array::from_fn(|k| point[k] - self.query[k]));
-                let candidate = Nearest { squared, index: *index };
-                let known = self.best.index != u32::MAX;
-                if squared < self.best.squared || (known && candidate < self.best) {
-                    self.best = candidate;
-                }
+                self.kept.offer(Nearest { squared, index: *index });
             }
             return;
         };
@@ -131,7 +179,7 @@ impl Search<'_> {
             let outer = self.offsets[axis];
             self.offsets[axis] = outer.max(distance);
             // equally near points are visited too: the one with the smallest index is wanted
-            if squared_length(&self.offsets) <= self.best.squared {
+            if squared_length(&self.offsets) <= self.kept.limit() {
                 self.descend(points, nodes, levels - 1);
             }
             self.offsets[axis] = outer;
@@ -188,5 +236,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn so_many_nearest_points_come_in_order() {
+        for points in [lattice(5, 9, false), vec![[2.0; 3]; 300], lattice(3000, 40, false)] {
+            let index = NearestIndex::new(&points);
+            for query in lattice(100, 60, false) {
+                let squared = |p: &[f64; 3]| squared_length(&std::array::from_fn(|k| p[k] - query[k]));
+                let mut all: Vec<Nearest> =
+                    points.iter().zip(0..).map(|(p, index)| Nearest { squared: squared(p), index }).collect();
+                all.sort_by(|a, b| a.partial_cmp(b).unwrap());
+                for count in [0, 1, 16] {
+                    assert_eq!(index.nearest_n(&query, count), all[..count.min(all.len())], "{query:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn points_that_are_nowhere_are_nobodys_neighbours() {
+        let index = NearestIndex::new(&[[0.0; 3], [f64::NAN; 3], [f64::INFINITY; 3], [1.0; 3]]);
+        let found: Vec<u32> = index.nearest_n(&[0.9; 3], 4).iter().map(|nearest| nearest.index).collect();
+        assert_eq!(found, [3, 0]);
+        assert_eq!(index.nearest_n(&[f64::NAN; 3], 4), []);
     }
 }
