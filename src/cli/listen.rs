@@ -1,10 +1,7 @@
-//! Everything that is said comes through one listener: progress, and what the library logs by `tracing`.
+//! What the programs remember of what is said.
 
 use crate::progress::{Event, Listener, Progress, Stage};
-use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
-use tracing::field::{Field, Visit};
-use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 
 /// Passes everything on to `inner` and remembers the warnings.
 pub(crate) struct Recorder {
@@ -13,13 +10,9 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    /// A recorder before `inner`, which also hears what the library logs from now on.
-    pub(crate) fn start(inner: Arc<dyn Listener>) -> Arc<Self> {
-        let recorder = Arc::new(Recorder { inner, warnings: Mutex::default() });
-        let subscriber = tracing_subscriber::registry().with(Forward(Arc::clone(&recorder)));
-        // Fails only when a log was started before, which then goes on.
-        let _ = tracing::subscriber::set_global_default(subscriber);
-        recorder
+    /// A recorder before `inner`.
+    pub(crate) fn before(inner: Arc<dyn Listener>) -> Arc<Self> {
+        Arc::new(Recorder { inner, warnings: Mutex::default() })
     }
 
     /// The handle for work that reports here.
@@ -49,35 +42,6 @@ impl Listener for Recorder {
 
     fn steps(&self, stage: Stage, done: usize, total: usize) {
         self.inner.steps(stage, done, total);
-    }
-}
-
-/// Turns log records of this library into events.
-struct Forward(Arc<Recorder>);
-
-impl<S: tracing::Subscriber> Layer<S> for Forward {
-    fn on_event(&self, record: &tracing::Event<'_>, _: Context<'_, S>) {
-        if !record.metadata().target().starts_with("semvs") {
-            return;
-        }
-        let mut message = Message(String::new());
-        record.record(&mut message);
-        let Message(text) = message;
-        self.0.event(&match *record.metadata().level() {
-            tracing::Level::ERROR | tracing::Level::WARN => Event::Warning(text),
-            tracing::Level::INFO => Event::Info(text),
-            _ => Event::Detail(text),
-        });
-    }
-}
-
-struct Message(String);
-
-impl Visit for Message {
-    fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
-        if field.name() == "message" {
-            let _ = write!(self.0, "{value:?}");
-        }
     }
 }
 

@@ -25,7 +25,7 @@ pub fn semvs(words: impl IntoIterator<Item = OsString>) -> ExitCode {
         Err(error) => return refuse(&error, failure),
     };
     let console = Console::new(Level::of(args.verbose, args.quiet));
-    let recorder = Recorder::start(Arc::new(console));
+    let recorder = Recorder::before(Arc::new(console));
     match run(&args, &matches, &recorder) {
         Ok(code) => code,
         Err(error) => {

@@ -78,7 +78,7 @@ pub fn is_project(job: &SceneJob) -> bool {
 
 /// Whether the scene can be read, be its images there or not.
 pub fn is_readable(job: &SceneJob) -> bool {
-    load_scene(&job.scene, &job.working_folder, &Limits::default()).is_ok()
+    load_scene(&job.scene, &job.working_folder, &Limits::default(), &Progress::silent()).is_ok()
 }
 
 /// Cameras stay as they are stored.

@@ -53,7 +53,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
     create_folder(&job.depth_maps)?;
     let loaded = load(&job.input, progress)?;
-    let mut cameras = working_cameras(&loaded, &job.resolution, job.input.strict)?;
+    let mut cameras = working_cameras(&loaded, &job.resolution, job.input.strict, progress)?;
     if job.only_fuses() {
         take_sizes_of_maps(&loaded, &mut cameras, &job.depth_maps, progress);
     }

@@ -3,13 +3,12 @@
 use super::import::{folder_of, row, warn_of_losses};
 use super::prepare::neighbors_of;
 use crate::error::{Error, Result};
-use crate::geometry::Camera;
 use crate::progress::Progress;
 use crate::report::{OutputReport, RunReport};
-use crate::scene::{ResolutionOptions, ViewIndex};
+use crate::scene::ViewIndex;
 use crate::store::archive::{move_names, move_sizes, read_archive, same_place, write_archive};
 use crate::store::atomic::AtomicFile;
-use crate::store::cameras::working_cameras;
+use crate::store::cameras::cameras_at_image_size;
 use crate::store::import::{LoadedScene, load_scene};
 use crate::store::paths::SearchPath;
 use semvs_formats::mvs::Container;
@@ -51,7 +50,7 @@ pub fn export_scene(job: &ExportSceneJob, progress: &Progress) -> Result<RunRepo
     let written = match job.kind {
         SceneExport::Archive(container) => archive(job, container, progress)?,
         SceneExport::Roi => region(job)?,
-        SceneExport::Neighbors => neighbors(job)?,
+        SceneExport::Neighbors => neighbors(job, progress)?,
     };
     Ok(RunReport { outputs: vec![written], ..RunReport::default() })
 }
@@ -87,9 +86,9 @@ fn region(job: &ExportSceneJob) -> Result<OutputReport> {
     Ok(row(&job.output, "region of interest", None))
 }
 
-fn neighbors(job: &ExportSceneJob) -> Result<OutputReport> {
-    let loaded = load_scene(&job.scene, &job.working_folder, &Limits::default())?;
-    let cameras = cameras_at_image_size(&loaded, false)?;
+fn neighbors(job: &ExportSceneJob, progress: &Progress) -> Result<OutputReport> {
+    let loaded = load_scene(&job.scene, &job.working_folder, &Limits::default(), progress)?;
+    let cameras = cameras_at_image_size(&loaded, false, progress)?;
     let found = neighbors_of(&loaded.scene, &cameras)?;
     let lists: Vec<Vec<u32>> = found.iter().map(|n| n.all.iter().map(|n| n.view.0).collect()).collect();
     let mut file = AtomicFile::create(&job.output)?;
@@ -97,12 +96,6 @@ fn neighbors(job: &ExportSceneJob) -> Result<OutputReport> {
         .map_err(|e| Error::format(&job.output, e))?;
     file.commit()?;
     Ok(row(&job.output, "neighbours", None))
-}
-
-/// The cameras at the sizes of the image files.
-pub(super) fn cameras_at_image_size(loaded: &LoadedScene, strict: bool) -> Result<Vec<Option<Camera>>> {
-    let full = ResolutionOptions { level: 0, max: u32::MAX, ..ResolutionOptions::default() };
-    working_cameras(loaded, &full, strict)
 }
 
 /// The image file of every view, made absolute.

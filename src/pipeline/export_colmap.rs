@@ -1,6 +1,6 @@
 //! A scene with its depth maps and cloud as a COLMAP workspace.
 
-use super::export::{cameras_at_image_size, image_files, names_below_common_folder};
+use super::export::{image_files, names_below_common_folder};
 use super::import::row;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -8,6 +8,7 @@ use crate::progress::Progress;
 use crate::report::{OutputReport, RunReport};
 use crate::store::archive::same_place;
 use crate::store::atomic::{create_folder, write_file};
+use crate::store::cameras::cameras_at_image_size;
 use crate::store::colmap::{has_maps, model_from_scene, write_configs, write_fused, write_maps, write_model};
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::{LoadedScene, load_scene};
@@ -41,9 +42,9 @@ pub struct ExportColmapJob {
 /// # Errors
 /// Unreadable files; a place that cannot be written or holds files of COLMAP.
 pub fn export_colmap(job: &ExportColmapJob, progress: &Progress) -> Result<RunReport> {
-    let loaded = load_scene(&job.scene, &job.working_folder, &Limits::default())?;
+    let loaded = load_scene(&job.scene, &job.working_folder, &Limits::default(), progress)?;
     let is_host = loaded.workspace.is_some() && same_place(&job.output, &job.scene);
-    let cameras = cameras_at_image_size(&loaded, false)?;
+    let cameras = cameras_at_image_size(&loaded, false, progress)?;
     let files = image_files(&loaded);
     let names = match &loaded.workspace {
         Some(workspace) => {

@@ -14,7 +14,7 @@ use crate::geometry::{Camera, Size};
 use crate::progress::{Event, Progress};
 use crate::report::RunReport;
 use crate::scene::{PointSource, ResolutionOptions, View, ViewIndex};
-use crate::store::cameras::{camera_of_map, working_cameras};
+use crate::store::cameras::{camera_of_map, cameras_at_image_size, working_cameras};
 use crate::store::colmap::{ColmapMaps, Pass};
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::LoadedScene;
@@ -43,8 +43,8 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let loaded = load(&job.input, progress)?;
     let store = open_maps(&job.depth_maps, &loaded)?;
     let cameras = match &job.resolution {
-        Some(resolution) => working_cameras(&loaded, resolution, job.input.strict)?,
-        None => map_cameras(&loaded, &store, job.input.strict)?,
+        Some(resolution) => working_cameras(&loaded, resolution, job.input.strict, progress)?,
+        None => map_cameras(&loaded, &store, job.input.strict, progress)?,
     };
     let mapped = maps_of_the_scene(&loaded, &cameras, &store, job.input.strict, progress)?;
     clock.stage("load");
@@ -97,9 +97,13 @@ fn open_maps(maps: &DepthMapsJob, loaded: &LoadedScene) -> Result<DepthStore> {
 }
 
 /// The cameras at the sizes of the depth maps; views without a map get the reduction of the first map.
-fn map_cameras(loaded: &LoadedScene, store: &DepthStore, strict: bool) -> Result<Vec<Option<Camera>>> {
-    let full = ResolutionOptions { level: 0, max: u32::MAX, ..ResolutionOptions::default() };
-    let full_size = working_cameras(loaded, &full, strict)?;
+fn map_cameras(
+    loaded: &LoadedScene,
+    store: &DepthStore,
+    strict: bool,
+    progress: &Progress,
+) -> Result<Vec<Option<Camera>>> {
+    let full_size = cameras_at_image_size(loaded, strict, progress)?;
     let mut sizes: Vec<Option<Size>> = Vec::with_capacity(full_size.len());
     let mut reduction = None;
     for (view, camera) in loaded.scene.views.iter().zip(&full_size) {

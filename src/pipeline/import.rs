@@ -6,10 +6,10 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::progress::Progress;
 use crate::report::{OutputReport, RunReport};
-use crate::scene::{DepthEstimate, DepthMap, ImageId, ResolutionOptions, Scene, ViewIndex};
+use crate::scene::{DepthEstimate, DepthMap, ImageId, Scene, ViewIndex};
 use crate::store::archive::{move_sizes, same_place, write_archive};
 use crate::store::atomic::AtomicFile;
-use crate::store::cameras::{camera_of_map, working_cameras};
+use crate::store::cameras::{camera_of_map, cameras_at_image_size};
 use crate::store::colmap::{ColmapMaps, Pass, Workspace};
 use crate::store::depth_store::DepthStore;
 use crate::store::import::{LoadedScene, load_scene};
@@ -91,7 +91,7 @@ pub fn import_scene(job: &ImportSceneJob, progress: &Progress) -> Result<RunRepo
     }
     if let Some(pass) = job.maps {
         // Names in the scene just written are relative to its folder.
-        let loaded = load_scene(&job.scene, folder, &limits)?;
+        let loaded = load_scene(&job.scene, folder, &limits, progress)?;
         let maps = ColmapMaps::of_scene(&workspace, pass, &loaded.scene, folder);
         if !maps.any() {
             let what = format!("no {} depth map here; leave --maps out", pass.name());
@@ -123,7 +123,7 @@ pub fn import_depths(job: &ImportDepthsJob, progress: &Progress) -> Result<RunRe
     if !(job.depth_scale.is_finite() && job.depth_scale > 0.0) {
         return Err(Error::invalid("--depth-scale must be above 0"));
     }
-    let loaded = load_scene(&job.scene, &job.working_folder, &limits)?;
+    let loaded = load_scene(&job.scene, &job.working_folder, &limits, progress)?;
     let files = match_files(&loaded.scene, &job.depths)?;
     let missing: Vec<&str> = (loaded.scene.views.iter().enumerate())
         .filter(|(i, view)| view.calibration.is_some() && !files.contains_key(&ViewIndex(*i as u32)))
@@ -137,8 +137,7 @@ pub fn import_depths(job: &ImportDepthsJob, progress: &Progress) -> Result<RunRe
             missing.join(", ")
         ));
     }
-    let full = ResolutionOptions { level: 0, max: u32::MAX, ..ResolutionOptions::default() };
-    let cameras = working_cameras(&loaded, &full, false)?;
+    let cameras = cameras_at_image_size(&loaded, false, progress)?;
     let sources = sources_with(&loaded, &cameras, progress);
     let store = DepthStore::new(&job.output, loaded.search.clone(), 0, limits);
     let files: Vec<(ViewIndex, PathBuf)> = files.into_iter().collect();
@@ -233,8 +232,7 @@ fn file_of(name: &str, folder: &Path) -> Option<PathBuf> {
 
 /// What every view is matched with, as far as it can be told without its images' pixels.
 fn sources(loaded: &LoadedScene, progress: &Progress) -> Vec<Vec<ImageId>> {
-    let full = ResolutionOptions { level: 0, max: u32::MAX, ..ResolutionOptions::default() };
-    match working_cameras(loaded, &full, false) {
+    match cameras_at_image_size(loaded, false, progress) {
         Ok(cameras) => sources_with(loaded, &cameras, progress),
         Err(error) => no_sources(loaded, &error, progress),
     }

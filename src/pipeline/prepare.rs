@@ -72,7 +72,7 @@ impl Prepared {
 /// Unreadable files.
 pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     let start = Instant::now();
-    let mut loaded = load_scene(&job.scene, &job.working_folder, &Limits::default())?;
+    let mut loaded = load_scene(&job.scene, &job.working_folder, &Limits::default(), progress)?;
     if let Some(path) = &job.pointcloud_file {
         replace_points(&mut loaded, path)?;
     }

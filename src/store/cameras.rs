@@ -4,9 +4,9 @@ use super::images::image_size;
 use super::import::LoadedScene;
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Size};
+use crate::progress::Progress;
 use crate::scene::{Calibration, ResolutionOptions, ViewIndex};
 use rayon::prelude::*;
-use tracing::warn;
 
 /// The camera of every view at the size at which its photograph is processed; `None` for uncalibrated images and for
 /// those whose photograph is missing, unreadable or of another shape than the scene says, which a warning names.
@@ -18,6 +18,7 @@ pub fn working_cameras(
     loaded: &LoadedScene,
     resolution: &ResolutionOptions,
     strict: bool,
+    progress: &Progress,
 ) -> Result<Vec<Option<Camera>>> {
     resolution.check()?;
     let views = &loaded.scene.views;
@@ -35,7 +36,7 @@ pub fn working_cameras(
             Some(Ok(camera)) => Some(camera),
             Some(Err(error)) if strict => return Err(error),
             Some(Err(error)) => {
-                warn!("{error}; view {i} is left out");
+                progress.warn(format!("{error}; view {i} is left out"));
                 first_problem.get_or_insert(error.to_string());
                 None
             }
@@ -52,6 +53,19 @@ pub fn working_cameras(
         return Err(Error::content(&loaded.path, what));
     }
     Ok(usable)
+}
+
+/// The camera of every view at the size of its photograph, as [`working_cameras`] gives them.
+///
+/// # Errors
+/// Those of [`working_cameras`].
+pub fn cameras_at_image_size(
+    loaded: &LoadedScene,
+    strict: bool,
+    progress: &Progress,
+) -> Result<Vec<Option<Camera>>> {
+    let full = ResolutionOptions { level: 0, max: u32::MAX, ..ResolutionOptions::default() };
+    working_cameras(loaded, &full, strict, progress)
 }
 
 fn working_camera(

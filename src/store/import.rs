@@ -5,12 +5,12 @@ use super::images::image_size;
 use super::paths::{SearchPath, clean_name};
 use crate::error::{Error, Result};
 use crate::geometry::{Roi, Size, normalized_k};
+use crate::progress::Progress;
 use crate::scene::{Calibration, ImageId, Neighbor, Scene, Tracks, View, ViewIndex};
 use nalgebra::{Matrix3, Vector3};
 use semvs_formats::Limits;
 use semvs_formats::mvs::{self, NO_ID, SceneFile};
 use std::path::{Path, PathBuf};
-use tracing::warn;
 
 /// A scene and what its file said beyond it.
 #[derive(Clone, Debug)]
@@ -46,7 +46,12 @@ impl LoadedScene {
 /// # Errors
 /// [`Error`] if the file cannot be read, a calibrated image has impossible camera data, or fewer than two images
 /// are calibrated.
-pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result<LoadedScene> {
+pub fn load_scene(
+    path: &Path,
+    working_folder: &Path,
+    limits: &Limits,
+    progress: &Progress,
+) -> Result<LoadedScene> {
     let workspace = path.is_dir().then(|| Workspace::at(path, None)).transpose()?;
     let (mut archive, container, search, trailing_bytes) = match &workspace {
         Some(workspace) => {
@@ -62,10 +67,10 @@ pub fn load_scene(path: &Path, working_folder: &Path, limits: &Limits) -> Result
     // Before repair merges them: a view that observed a point twice counts twice in view selection.
     let tracks = import_tracks(&archive);
     let repairs = archive.repair().map_err(|e| Error::format(path, e))?;
-    warn_of_repairs(path, &repairs);
-    warn_of_remains(path, &archive, trailing_bytes);
+    warn_of_repairs(path, &repairs, progress);
+    warn_of_remains(path, &archive, trailing_bytes, progress);
     archive.check().map_err(|e| Error::format(path, e))?;
-    let views = import_views(path, &archive, container, &search)?;
+    let views = import_views(path, &archive, container, &search, progress)?;
     let calibrated = views.iter().filter(|v| v.calibration.is_some()).count();
     if calibrated < 2 {
         let what = format!(
@@ -85,6 +90,7 @@ fn import_views(
     archive: &mvs::Scene,
     container: mvs::Container,
     search: &SearchPath,
+    progress: &Progress,
 ) -> Result<Vec<View>> {
     let mut views = Vec::with_capacity(archive.images.len());
     for (i, image) in archive.images.iter().enumerate() {
@@ -94,9 +100,17 @@ fn import_views(
         let calibration = match import_calibration(archive, image) {
             Some(mut calibration) => {
                 if calibration.size.is_none() {
+                    // The working size of a project archive does when the photograph is elsewhere.
                     let stored =
                         (image.width > 0 && image.height > 0).then(|| Size::new(image.width, image.height));
-                    size_from_file(&mut calibration, container, &search.find(&name), stored);
+                    match (image_size(&search.find(&name)), stored) {
+                        (Ok(size), _) | (Err(_), Some(size)) => {
+                            size_from_file(&mut calibration, container, size);
+                        }
+                        (Err(error), None) => {
+                            progress.warn(format!("{error}; its size is not in the scene either"));
+                        }
+                    }
                 }
                 Some(calibration)
             }
@@ -133,21 +147,11 @@ pub(crate) fn import_calibration(archive: &mvs::Scene, image: &mvs::Image) -> Op
     Some(Calibration { normalized_k, rotation, center, size })
 }
 
-/// Fills in the size of a camera that was stored without one, and undoes the older way of normalising the principal
-/// point, `c / max(w, h)` without half-pixel terms, which files up to version 5 may use. `stored`: the working size of a
-/// project archive, which does when the photograph is elsewhere.
-fn size_from_file(
-    calibration: &mut Calibration,
-    container: mvs::Container,
-    image: &Path,
-    stored: Option<Size>,
-) {
+/// Gives a camera that was stored without a size that of its image file, and undoes the older way of normalising the
+/// principal point, `c / max(w, h)` without half-pixel terms, which files up to version 5 may use.
+fn size_from_file(calibration: &mut Calibration, container: mvs::Container, size: Size) {
     /// A principal point is near 0.5 by the older rule and near 0 by the newer one.
     const OLDER_RULE: f64 = 0.3;
-    let size = match (image_size(image), stored) {
-        (Ok(size), _) | (Err(_), Some(size)) => size,
-        (Err(error), None) => return warn!("{error}; its size is not in the scene either"),
-    };
     calibration.size = Some(size);
     let k = &mut calibration.normalized_k;
     let is_old = matches!(container, mvs::Container::Interface { version } if version <= 5);
@@ -159,17 +163,23 @@ fn size_from_file(
 }
 
 /// What of the file is not used.
-fn warn_of_remains(path: &Path, archive: &mvs::Scene, trailing_bytes: u64) {
+fn warn_of_remains(path: &Path, archive: &mvs::Scene, trailing_bytes: u64, progress: &Progress) {
     if trailing_bytes > 0 {
-        warn!("{}: {trailing_bytes} bytes after the end of the scene are ignored", path.display());
+        progress.warn(format!(
+            "{}: {trailing_bytes} bytes after the end of the scene are ignored",
+            path.display()
+        ));
     }
     if archive.stored_box.is_some_and(|stored| stored.is_damaged()) {
-        warn!("{}: its region of interest holds numbers that are not finite and is ignored", path.display());
+        progress.warn(format!(
+            "{}: its region of interest holds numbers that are not finite and is ignored",
+            path.display()
+        ));
     }
 }
 
 /// One line for each kind of flaw that was set right.
-fn warn_of_repairs(path: &Path, repairs: &mvs::Repairs) {
+fn warn_of_repairs(path: &Path, repairs: &mvs::Repairs, progress: &Progress) {
     let kinds = [
         (repairs.dropped_points, "sparse points at no finite place are left out"),
         (repairs.dropped_views, "views of sparse points name no calibrated image and are left out"),
@@ -178,7 +188,7 @@ fn warn_of_repairs(path: &Path, repairs: &mvs::Repairs) {
         (repairs.shared_ids, "images share the global ID of another one; all get their position as ID"),
     ];
     for (count, what) in kinds.iter().filter(|(count, _)| *count > 0) {
-        warn!("{}: {count} {what}", path.display());
+        progress.warn(format!("{}: {count} {what}", path.display()));
     }
 }
 

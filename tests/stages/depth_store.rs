@@ -1,6 +1,7 @@
 //! Depth maps that OpenMVS wrote, held against the scene that they belong to.
 
 use crate::common::{Scratch, facade6};
+use semvs::progress::Progress;
 use semvs::scene::{ImageId, ResolutionOptions};
 use semvs::store::cameras::working_cameras;
 use semvs::store::depth_store::{DepthStore, Existing};
@@ -22,11 +23,11 @@ fn maps_of_openmvs_belong_to_their_scene_and_only_to_its_size() {
     let scratch = Scratch::new();
     scratch.add_maps("post7", "");
     let store = store(&scratch.path(""));
-    let scene = load_scene(&facade6().join("scene.mvs"), &facade6(), &Limits::default())
+    let scene = load_scene(&facade6().join("scene.mvs"), &facade6(), &Limits::default(), &Progress::silent())
         .unwrap();
-    let cameras = working_cameras(&scene, &HALF, true).unwrap();
+    let cameras = working_cameras(&scene, &HALF, true, &Progress::silent()).unwrap();
     let full = ResolutionOptions { level: 0, ..HALF };
-    let large = working_cameras(&scene, &full, true).unwrap();
+    let large = working_cameras(&scene, &full, true, &Progress::silent()).unwrap();
     for (i, view) in scene.scene.views.iter().enumerate() {
         let existing = |id: ImageId, cameras: &[Option<semvs::geometry::Camera>]| {
             store.existing(id, cameras[i].as_ref().unwrap())

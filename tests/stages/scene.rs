@@ -2,6 +2,7 @@
 
 use crate::common::{bytes, facade6, shared};
 use semvs::geometry::Camera;
+use semvs::progress::Progress;
 use semvs::scene::{NeighborOptions, ResolutionOptions, ViewNeighbors, select_neighbors};
 use semvs::store::cameras::working_cameras;
 use semvs::store::import::{LoadedScene, load_scene};
@@ -12,11 +13,11 @@ use std::path::Path;
 const SCORE_TOLERANCE: f32 = 1e-6;
 
 fn load(path: &Path) -> LoadedScene {
-    load_scene(path, Path::new(""), &Limits::default()).unwrap()
+    load_scene(path, Path::new(""), &Limits::default(), &Progress::silent()).unwrap()
 }
 
 fn select(loaded: &LoadedScene, resolution: &ResolutionOptions) -> (Vec<Option<Camera>>, Vec<ViewNeighbors>) {
-    let cameras = working_cameras(loaded, resolution, true).unwrap();
+    let cameras = working_cameras(loaded, resolution, true, &Progress::silent()).unwrap();
     let neighbors = select_neighbors(&loaded.scene, &cameras, &NeighborOptions::default()).unwrap();
     (cameras, neighbors)
 }
@@ -113,11 +114,11 @@ fn one_bad_photograph_drops_its_view_and_strictness_makes_it_an_error() {
     }
     std::fs::remove_file(scratch.path().join(image(1))).unwrap();
     std::fs::write(scratch.path().join(image(2)), b"no image").unwrap();
-    let cameras = working_cameras(&loaded, &resolution(1, 160), false).unwrap();
+    let cameras = working_cameras(&loaded, &resolution(1, 160), false, &Progress::silent()).unwrap();
     let usable: Vec<bool> = cameras.iter().map(Option::is_some).collect();
     assert_eq!(usable, [true, false, false, true, true, true]);
     let error =
-        working_cameras(&loaded, &resolution(1, 160), true).unwrap_err().to_string();
+        working_cameras(&loaded, &resolution(1, 160), true, &Progress::silent()).unwrap_err().to_string();
     assert!(error.contains("0004.jpg"), "{error}");
     let neighbors = select_neighbors(&loaded.scene, &cameras, &NeighborOptions::default()).unwrap();
     assert_eq!(neighbors[1], ViewNeighbors::default());
@@ -126,7 +127,7 @@ fn one_bad_photograph_drops_its_view_and_strictness_makes_it_an_error() {
         std::fs::remove_file(scratch.path().join(image(i))).unwrap();
     }
     let error =
-        working_cameras(&loaded, &resolution(1, 160), false).unwrap_err().to_string();
+        working_cameras(&loaded, &resolution(1, 160), false, &Progress::silent()).unwrap_err().to_string();
     assert!(error.contains("1 of its 6 images") && error.contains("working folder"), "{error}");
 }
 

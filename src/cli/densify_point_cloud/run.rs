@@ -11,12 +11,13 @@ use crate::cli::listen::Recorder;
 use crate::cli::one_line::printable;
 use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
-use crate::cli::values::{openmvs_path, under, with_suffix};
+use crate::cli::values::{openmvs_path, under};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
 use crate::report::{RunReport, class_table};
 use crate::store::atomic::create_folder;
 use crate::store::cloud::PlyLayout;
+use crate::store::paths::with_suffix;
 use semvs_formats::mvs::ArchiveKind;
 use std::ffi::OsString;
 use std::io::IsTerminal;
@@ -55,7 +56,7 @@ pub fn densify_point_cloud(words: impl IntoIterator<Item = OsString>) -> ExitCod
     if let Some(Err(why)) = wanted.map(priority::set) {
         log.line(1, &format!("--process-priority {}: not set: {why}", typing.args.process_priority));
     }
-    let recorder = Recorder::start(log.clone());
+    let recorder = Recorder::before(log.clone());
     match run(&typing, &folder, &log, &recorder) {
         Ok(()) => {
             log.memory();

@@ -1,4 +1,5 @@
 use super::*;
+use crate::progress::Progress;
 use crate::scene::ResolutionOptions;
 use crate::store::cameras::working_cameras;
 use crate::store::import::load_scene;
@@ -13,13 +14,13 @@ fn fixture(name: &str) -> PathBuf {
 const RESOLUTION: ResolutionOptions = ResolutionOptions { level: 1, min: 160, max: 2560 };
 
 fn facade() -> LoadedScene {
-    load_scene(&fixture("scene.mvs"), &fixture(""), &Limits::default()).unwrap()
+    load_scene(&fixture("scene.mvs"), &fixture(""), &Limits::default(), &Progress::silent()).unwrap()
 }
 
 #[test]
 fn a_densified_scene_equals_openmvs_to_the_byte() {
     let reference = fixture("openmvs-2.3.0/post7/scene_dense.mvs");
-    let stored = load_scene(&reference, &fixture(""), &Limits::default()).unwrap();
+    let stored = load_scene(&reference, &fixture(""), &Limits::default(), &Progress::silent()).unwrap();
     let neighbors: Vec<ViewNeighbors> = stored
         .scene
         .views
@@ -27,7 +28,7 @@ fn a_densified_scene_equals_openmvs_to_the_byte() {
         .map(|v| ViewNeighbors { all: v.neighbors.clone(), avg_depth: v.avg_depth, ..Default::default() })
         .collect();
     let loaded = facade();
-    let cameras = working_cameras(&loaded, &RESOLUTION, true).unwrap();
+    let cameras = working_cameras(&loaded, &RESOLUTION, true, &Progress::silent()).unwrap();
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("new/folder/scene_dense.mvs");
     write_interface(&path, &interface_archive(&loaded, &cameras, &neighbors)).unwrap();
@@ -40,7 +41,7 @@ fn cameras_of_no_processed_view_keep_what_they_had() {
     let spare = loaded.archive.platforms[0].cameras[0].clone();
     loaded.archive.platforms[0].cameras.extend([spare.clone(), spare]);
     loaded.archive.images[5].camera = 1;
-    let mut cameras = working_cameras(&loaded, &RESOLUTION, true).unwrap();
+    let mut cameras = working_cameras(&loaded, &RESOLUTION, true, &Progress::silent()).unwrap();
     cameras[5] = None;
     let archive = interface_archive(&loaded, &cameras, &[]);
     let sizes: Vec<_> = archive.platforms[0].cameras.iter().map(|c| (c.width, c.height)).collect();

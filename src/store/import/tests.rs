@@ -46,12 +46,13 @@ fn load(archive: &mvs::Scene, version: u32) -> Result<LoadedScene> {
     let file = SceneFile { scene: archive.clone(), container, reserved: 0, trailing_bytes: 0 };
     file.write(&mut bytes).unwrap();
     std::fs::write(&path, bytes).unwrap();
-    load_scene(&path, scratch.path(), &Limits::default())
+    load_scene(&path, scratch.path(), &Limits::default(), &Progress::silent())
 }
 
 #[test]
 fn the_bundled_scene_loads() {
-    let loaded = load_scene(&facade(), Path::new("elsewhere"), &Limits::default()).unwrap();
+    let loaded =
+        load_scene(&facade(), Path::new("elsewhere"), &Limits::default(), &Progress::silent()).unwrap();
     assert_eq!(loaded.container, mvs::Container::Interface { version: 7 });
     assert_eq!((loaded.scene.views.len(), loaded.scene.tracks.len()), (6, 6344));
     let view = &loaded.scene.views[1];
@@ -143,7 +144,7 @@ fn normalised_intrinsics_take_the_size_of_the_photograph() {
         let mut bytes = Vec::new();
         mvs::write_interface(&mut bytes, &archive, version).unwrap();
         std::fs::write(&path, bytes).unwrap();
-        let loaded = load_scene(&path, scratch.path(), &Limits::default()).unwrap();
+        let loaded = load_scene(&path, scratch.path(), &Limits::default(), &Progress::silent()).unwrap();
         let calibration = loaded.scene.views[0].calibration.as_ref().unwrap();
         assert_eq!(calibration.size, Some(Size::new(200, 100)));
         let k = calibration.camera_at(Size::new(200, 100)).k().clone_owned();
@@ -168,7 +169,8 @@ fn unusable_scenes_are_errors_that_say_why() {
     fails(&|a| a.images[1..].iter_mut().for_each(|i| i.pose = NO_ID), "at least two");
     fails(&|a| a.images.clear(), "");
     let scratch = tempfile::tempdir().unwrap();
-    let absent = load_scene(&scratch.path().join("no.mvs"), Path::new(""), &Limits::default());
+    let absent =
+        load_scene(&scratch.path().join("no.mvs"), Path::new(""), &Limits::default(), &Progress::silent());
     assert!(absent.unwrap_err().to_string().contains("no.mvs"));
 }
 
@@ -180,6 +182,9 @@ fn every_prefix_of_a_scene_is_refused() {
     mvs::write_interface(&mut bytes, &archive(), 7).unwrap();
     for length in (0..bytes.len()).step_by(7) {
         std::fs::write(&path, &bytes[..length]).unwrap();
-        assert!(load_scene(&path, scratch.path(), &Limits::default()).is_err(), "{length} bytes");
+        assert!(
+            load_scene(&path, scratch.path(), &Limits::default(), &Progress::silent()).is_err(),
+            "{length} bytes"
+        );
     }
 }
