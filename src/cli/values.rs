@@ -1,6 +1,5 @@
 //! Values as people type them.
 
-use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
 /// 0/1, true/false, yes/no, on/off.
@@ -37,13 +36,6 @@ fn simplify(path: &Path) -> PathBuf {
         }
     }
     if out.as_os_str().is_empty() { PathBuf::from(".") } else { out }
-}
-
-/// `path` followed by `suffix` in its last component.
-pub(crate) fn with_suffix(path: &Path, suffix: impl AsRef<OsStr>) -> PathBuf {
-    let mut text = path.as_os_str().to_owned();
-    text.push(suffix);
-    PathBuf::from(text)
 }
 
 #[cfg(test)]

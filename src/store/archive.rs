@@ -15,7 +15,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error`] about `path`.
-pub fn read_archive(path: &Path, limits: &Limits) -> Result<(mvs::Scene, Container)> {
+pub(crate) fn read_archive(path: &Path, limits: &Limits) -> Result<(mvs::Scene, Container)> {
     if path.is_dir() {
         let scene = Workspace::at(path, None)?.read_scene(limits)?;
         return Ok((scene, Container::Interface { version: mvs::NEWEST_VERSION }));
@@ -29,7 +29,7 @@ pub fn read_archive(path: &Path, limits: &Limits) -> Result<(mvs::Scene, Contain
 ///
 /// # Errors
 /// The place cannot be written; a mesh for an interface archive; an index that leads nowhere.
-pub fn write_archive(path: &Path, scene: &mvs::Scene, container: Container) -> Result<()> {
+pub(crate) fn write_archive(path: &Path, scene: &mvs::Scene, container: Container) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     let written = match container {
         Container::Interface { version } => mvs::write_interface(&mut file, scene, version),
@@ -41,7 +41,7 @@ pub fn write_archive(path: &Path, scene: &mvs::Scene, container: Container) -> R
 
 /// Moves image sizes to where an archive of the kind `to` has them: interface archives at the cameras, with intrinsics
 /// in pixels; project archives at the images, with normalised intrinsics.
-pub fn move_sizes(scene: &mut mvs::Scene, to: Container) {
+pub(crate) fn move_sizes(scene: &mut mvs::Scene, to: Container) {
     for image in scene.images.iter_mut().filter(|image| image.pose != NO_ID) {
         let platform = scene.platforms.get_mut(image.platform as usize);
         let Some(camera) = platform.and_then(|p| p.cameras.get_mut(image.camera as usize)) else { continue };
@@ -77,7 +77,7 @@ fn pixel_k(camera: &mvs::Camera, size: Size) -> [f64; 9] {
 
 /// Makes names of images and masks, which `search` finds, relative to `folder`. Names that are found from there by
 /// themselves, absolute ones and ones that are no text stay to the byte.
-pub fn move_names(scene: &mut mvs::Scene, search: &SearchPath, folder: &Path) {
+pub(crate) fn move_names(scene: &mut mvs::Scene, search: &SearchPath, folder: &Path) {
     let moved = |stored: &[u8]| {
         let Ok(text) = std::str::from_utf8(stored) else { return stored.to_vec() };
         let name = clean_name(text);
@@ -100,7 +100,7 @@ pub fn move_names(scene: &mut mvs::Scene, search: &SearchPath, folder: &Path) {
 }
 
 /// Whether two paths mean the same place, be it there or not.
-pub fn same_place(a: &Path, b: &Path) -> bool {
+pub(crate) fn same_place(a: &Path, b: &Path) -> bool {
     let resolved = |path: &Path| {
         let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
         path.canonicalize().or_else(|_| std::path::absolute(path)).ok()

@@ -13,7 +13,7 @@ const BUFFER: usize = 1 << 20;
 /// Dropped without [`AtomicFile::commit`], it leaves nothing behind and what was there before stays. A target that
 /// is neither file nor folder (a pipe, `/dev/stdout`) is written directly.
 #[derive(Debug)]
-pub struct AtomicFile {
+pub(crate) struct AtomicFile {
     writer: BufWriter<File>,
     temporary: Option<tempfile::TempPath>,
     path: PathBuf,
@@ -24,7 +24,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// [`Error`] if the folder cannot be created or written, or `path` is a folder.
-    pub fn create(path: &Path) -> Result<Self> {
+    pub(crate) fn create(path: &Path) -> Result<Self> {
         if let Ok(metadata) = std::fs::metadata(path) {
             if metadata.is_dir() {
                 return Err(Error::content(path, "cannot write: a folder has this name; give a file name"));
@@ -44,16 +44,11 @@ impl AtomicFile {
         Ok(AtomicFile { writer, temporary: Some(temporary), path: path.to_owned() })
     }
 
-    /// The final name.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Completes the file: flushes it and gives it its name, replacing what had it.
     ///
     /// # Errors
     /// [`Error::Io`] if the medium fails; then nothing has changed.
-    pub fn commit(self) -> Result<()> {
+    pub(crate) fn commit(self) -> Result<()> {
         let AtomicFile { mut writer, temporary, path } = self;
         writer.flush().map_err(|e| Error::io(&path, "write", e))?;
         drop(writer);
@@ -86,7 +81,7 @@ impl Seek for AtomicFile {
 ///
 /// # Errors
 /// As [`AtomicFile::create`] and [`AtomicFile::commit`].
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.write_all(bytes).map_err(|e| Error::io(path, "write", e))?;
     file.commit()
@@ -96,7 +91,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
 ///
 /// # Errors
 /// As [`AtomicFile::create`].
-pub fn check_writable(path: &Path) -> Result<()> {
+pub(crate) fn check_writable(path: &Path) -> Result<()> {
     AtomicFile::create(path).map(drop)
 }
 
@@ -104,7 +99,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 ///
 /// # Errors
 /// [`Error`] if a file is in the way or the system refuses.
-pub fn create_folder(folder: &Path) -> Result<()> {
+pub(crate) fn create_folder(folder: &Path) -> Result<()> {
     if folder.is_dir() {
         return Ok(());
     }

@@ -9,12 +9,12 @@ use image::DynamicImage;
 use std::path::{Path, PathBuf};
 
 /// Name of the mask of an image without one: its last extension becomes `.mask.png`.
-pub fn default_mask_name(image_name: &str) -> String {
+pub(crate) fn default_mask_name(image_name: &str) -> String {
     format!("{}.mask.png", without_extension(image_name))
 }
 
 /// Path in `folder` of the mask of an image: its base name with `.mask.png` for its extension.
-pub fn mask_in_folder(folder: &Path, image_name: &str) -> PathBuf {
+pub(crate) fn mask_in_folder(folder: &Path, image_name: &str) -> PathBuf {
     let name = clean_name(image_name);
     let base = name.rsplit('/').next().unwrap_or(&name);
     folder.join(default_mask_name(base))
@@ -27,7 +27,7 @@ pub fn mask_in_folder(folder: &Path, image_name: &str) -> PathBuf {
 ///
 /// # Errors
 /// [`Error`] if the file cannot be read or decoded, or holds real numbers.
-pub fn load_mask(path: &Path, size: Size) -> Result<Grid<u16>> {
+pub(crate) fn load_mask(path: &Path, size: Size) -> Result<Grid<u16>> {
     let image = decode(path)?;
     let from = Size::new(image.width(), image.height());
     let values: Vec<u16> = match image {

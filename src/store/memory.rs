@@ -4,13 +4,13 @@ use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// Environment variable that says how many MiB may be used, less than there are.
-pub const LIMIT_VARIABLE: &str = "SEMVS_MEMORY_MIB";
+pub(crate) const LIMIT_VARIABLE: &str = "SEMVS_MEMORY_MIB";
 
 /// Refuses to begin `work` that needs at least `bytes` if there are fewer. Where nothing is known there is enough.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] that says what to do.
-pub fn require(bytes: u64, work: &str) -> Result<()> {
+pub(crate) fn require(bytes: u64, work: &str) -> Result<()> {
     match available() {
         Some(there) if there < bytes => Err(Error::OutOfMemory(format!(
             "{work} needs at least {} MiB, {} MiB are free: give fewer --max-threads, a lower --max-resolution, or \

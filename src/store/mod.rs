@@ -1,7 +1,7 @@
 //! Every access to files: scenes, photographs, masks, depth maps, clouds.
 
-pub mod archive;
-pub mod atomic;
+pub(crate) mod archive;
+pub(crate) mod atomic;
 pub(crate) mod byte_cache;
 pub mod cameras;
 pub mod cloud;
@@ -16,11 +16,11 @@ pub mod import;
 mod jpeg;
 mod label_png;
 pub mod labels;
-pub mod masks;
-pub mod memory;
-pub mod packed;
+pub(crate) mod masks;
+pub(crate) mod memory;
+pub(crate) mod packed;
 pub mod paths;
 pub mod rasters;
 pub mod spool;
 mod stale_clouds;
-pub mod stored_cloud;
+pub(crate) mod stored_cloud;

@@ -12,7 +12,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// `path` without the `.zst` that a compressed file ends in.
-pub fn unpacked_name(path: &Path) -> PathBuf {
+pub(crate) fn unpacked_name(path: &Path) -> PathBuf {
     if is_packed(path) { path.with_extension("") } else { path.to_owned() }
 }
 
@@ -48,7 +48,7 @@ fn unpack(path: &Path, limits: &Limits) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// The file cannot be read or decompressed.
-pub fn read_head(path: &Path, count: u64) -> Result<Vec<u8>> {
+pub(crate) fn read_head(path: &Path, count: u64) -> Result<Vec<u8>> {
     let mut head = Vec::new();
     open(path)?.take(count).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
     Ok(head)
@@ -58,7 +58,7 @@ pub fn read_head(path: &Path, count: u64) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// [`Error`] about `path`.
-pub fn read_scene(path: &Path, limits: &Limits) -> Result<mvs::Scene> {
+pub(crate) fn read_scene(path: &Path, limits: &Limits) -> Result<mvs::Scene> {
     let scene = match is_packed(path) {
         true => SceneFile::from_bytes(&unpack(path, limits)?, limits).map(|file| file.scene),
         false => mvs::read(path, limits),
@@ -70,7 +70,7 @@ pub fn read_scene(path: &Path, limits: &Limits) -> Result<mvs::Scene> {
 ///
 /// # Errors
 /// [`Error`] about `path`.
-pub fn read_map(path: &Path, limits: &Limits) -> Result<DepthEstimate> {
+pub(crate) fn read_map(path: &Path, limits: &Limits) -> Result<DepthEstimate> {
     if !is_packed(path) {
         return read_depth_map(path, *limits);
     }
@@ -83,7 +83,7 @@ pub fn read_map(path: &Path, limits: &Limits) -> Result<DepthEstimate> {
 ///
 /// # Errors
 /// [`Error`] about `path`.
-pub fn read_cloud(path: &Path, limits: &Limits) -> Result<ply::Cloud> {
+pub(crate) fn read_cloud(path: &Path, limits: &Limits) -> Result<ply::Cloud> {
     ply::read_cloud(open(path)?, limits).map_err(|e| Error::format(path, e))
 }
 

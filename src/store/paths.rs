@@ -1,5 +1,6 @@
 //! Names as scenes store them, and the files they mean.
 
+use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
 /// Where relative names of a scene are looked for: the working folder first, then the folder of the scene file.
@@ -77,7 +78,7 @@ pub fn name_relative_to(path: &Path, folder: &Path) -> String {
 }
 
 /// `path` followed by `suffix` in its last component.
-pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+pub fn with_suffix(path: &Path, suffix: impl AsRef<OsStr>) -> PathBuf {
     let mut text = path.as_os_str().to_owned();
     text.push(suffix);
     PathBuf::from(text)

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// The points of a scene file, all or some of them.
 #[derive(Clone, Copy, Debug)]
-pub struct StoredCloud<'a> {
+pub(crate) struct StoredCloud<'a> {
     points: &'a mvs::PointCloud,
     /// Positions in `points`; `None` = all.
     order: Option<&'a [u32]>,
@@ -21,22 +21,22 @@ pub struct StoredCloud<'a> {
 
 impl<'a> StoredCloud<'a> {
     /// All of `points`.
-    pub fn new(points: &'a mvs::PointCloud) -> Self {
+    pub(crate) fn new(points: &'a mvs::PointCloud) -> Self {
         StoredCloud { points, order: None, always_colored: false }
     }
 
     /// Of the same points those at the positions `order`, in that order.
-    pub fn only(self, order: &'a [u32]) -> Self {
+    pub(crate) fn only(self, order: &'a [u32]) -> Self {
         StoredCloud { order: Some(order), ..self }
     }
 
     /// The same with white points where they have no colours.
-    pub fn always_colored(self) -> Self {
+    pub(crate) fn always_colored(self) -> Self {
         StoredCloud { always_colored: true, ..self }
     }
 
     /// The same points in memory of their own.
-    pub fn copied(&self) -> mvs::PointCloud {
+    pub(crate) fn copied(&self) -> mvs::PointCloud {
         let mut out = mvs::PointCloud::default();
         self.each(|i| {
             out.positions.push(self.points.positions[i]);
@@ -94,7 +94,7 @@ impl PointSource for StoredCloud<'_> {
 
 /// The camera of every view at the size that the scene was worked on: that of the stored image, else of the stored
 /// camera. `None` for views without a pose or a known size.
-pub fn stored_cameras(loaded: &LoadedScene) -> Vec<Option<Camera>> {
+pub(crate) fn stored_cameras(loaded: &LoadedScene) -> Vec<Option<Camera>> {
     let images = loaded.archive.images.iter();
     let views = loaded.scene.views.iter().zip(images);
     views
@@ -108,7 +108,7 @@ pub fn stored_cameras(loaded: &LoadedScene) -> Vec<Option<Camera>> {
 
 /// The scene as it was loaded, with `points` in place of its own, as OpenMVS saves a scene that it only worked on the
 /// points of. `project`: for a project archive, which also keeps names, sizes and the mesh.
-pub fn resaved_archive(loaded: &LoadedScene, points: mvs::PointCloud, project: bool) -> mvs::Scene {
+pub(crate) fn resaved_archive(loaded: &LoadedScene, points: mvs::PointCloud, project: bool) -> mvs::Scene {
     let mut archive = interface_archive(loaded, &vec![None; loaded.scene.views.len()], &[]);
     archive.points = points;
     if project {
@@ -129,7 +129,7 @@ pub fn resaved_archive(loaded: &LoadedScene, points: mvs::PointCloud, project: b
 ///
 /// # Errors
 /// The cloud cannot be read or has no normals, or the file cannot be written.
-pub fn write_scaled(path: &Path, cloud: &dyn PointSource, scales: &[(f32, f32)]) -> Result<()> {
+pub(crate) fn write_scaled(path: &Path, cloud: &dyn PointSource, scales: &[(f32, f32)]) -> Result<()> {
     const CHUNK: usize = 4096;
     let has = cloud.layout();
     let fields = [

@@ -30,6 +30,7 @@ use crate::report::{OutputReport, RunReport};
 use crate::store::atomic::write_file;
 use crate::store::cloud::PlyLayout;
 use crate::store::colmap::Workspace;
+use crate::store::paths::with_suffix;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use semvs_formats::mvs::{ArchiveKind, Container, NEWEST_VERSION};
@@ -63,7 +64,7 @@ fn default_cloud(scene: &Path) -> PathBuf {
     if scene.is_dir() {
         return own_folder(scene).join("dense.ply");
     }
-    crate::cli::values::with_suffix(&scene.with_extension(""), "_dense.ply")
+    with_suffix(&scene.with_extension(""), "_dense.ply")
 }
 
 /// The folder in a COLMAP workspace that holds what this program makes.

@@ -1,11 +1,11 @@
 //! Jobs other than densification, in the order in which OpenMVS looks for them: the first one asked for ends the run.
 
 use super::front::{self, Typing};
-use crate::cli::values::with_suffix;
 use crate::error::Result;
 use crate::pipeline::{self, CloudJob, CloudWork, DensifyJob, SceneArchive, SceneJob, SplitJob};
 use crate::progress::Progress;
 use crate::store::cloud::PlyLayout;
+use crate::store::paths::with_suffix;
 use std::path::{Path, PathBuf};
 
 /// Does the first of the small jobs that were asked for; `false`: densify.
