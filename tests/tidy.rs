@@ -139,15 +139,12 @@ fn report(problems: &[String]) {
 
 /// Names of the modules that a line of code takes from this crate.
 fn imported(line: &str) -> Vec<String> {
-    let Some(at) = line.find("crate::") else { return Vec::new() };
-    let rest = &line[at + "crate::".len()..];
-    let inner = match rest.strip_prefix('{') {
-        Some(list) => list.split('}').next().unwrap_or_default(),
-        None => rest,
-    };
-    let parts: Vec<&str> = if rest.starts_with('{') { inner.split(',').collect() } else { vec![inner] };
-    parts
-        .iter()
+    line.split("crate::")
+        .skip(1)
+        .flat_map(|rest| match rest.strip_prefix('{') {
+            Some(list) => list.split('}').next().unwrap_or_default().split(',').collect(),
+            None => vec![rest],
+        })
         .map(|part| part.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>())
         .filter(|name| name.starts_with(char::is_lowercase))
         .collect()
@@ -161,6 +158,9 @@ fn modules_import_only_what_the_table_allows() {
             continue;
         };
         for (i, line) in source.code.iter().enumerate() {
+            if line.trim_end().ends_with("crate::{") {
+                problems.push(format!("{}:{}: a line per module, please", source.path.display(), i + 1));
+            }
             for name in imported(line) {
                 let known = IMPORTS.iter().any(|(module, _)| *module == name);
                 let fine = name == source.module
@@ -188,6 +188,72 @@ fn every_module_has_a_row_in_the_table() {
         if !["formats", "main", "lib"].contains(&module) && IMPORTS.iter().all(|(known, _)| *known != module)
         {
             problems.push(format!("{}: no row for {module}", source.path.display()));
+        }
+    }
+    report(&problems);
+}
+
+fn page(name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(name)).unwrap()
+}
+
+#[test]
+fn the_architecture_page_has_the_same_table() {
+    let page = page("ARCHITECTURE.md");
+    let cells = |line: &str| line.split('|').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
+    let rows: Vec<Vec<String>> = page.lines().filter(|line| line.starts_with("| ")).map(cells).collect();
+    let mut problems = Vec::new();
+    for (module, allowed) in
+        IMPORTS.iter().filter(|(module, _)| !["cli", "error", "progress"].contains(module))
+    {
+        let row = rows.iter().find(|row| row[1].split(", ").any(|name| name == *module));
+        let stated = row.map(|row| row[2].as_str()).unwrap_or_default();
+        let mut names: Vec<&str> =
+            stated.split(", ").filter(|n| !["nothing", "formats"].contains(n)).collect();
+        let mut allowed = allowed.to_vec();
+        names.sort_unstable();
+        allowed.sort_unstable();
+        let all = stated == "all of these" && allowed.len() + 4 == IMPORTS.len();
+        if names != allowed && !all {
+            problems.push(format!(
+                "docs/ARCHITECTURE.md: {module} may import {allowed:?}, the page says {stated:?}"
+            ));
+        }
+    }
+    report(&problems);
+}
+
+#[test]
+fn the_architecture_page_knows_the_tree() {
+    let page = page("ARCHITECTURE.md");
+    let layout = page.split("```").nth(1).unwrap();
+    let words: Vec<&str> = layout.split([' ', '\n']).filter(|word| !word.is_empty()).collect();
+    let files = sources();
+    let mut problems = Vec::new();
+    for (module, _) in IMPORTS {
+        if !words.contains(&format!("{module}/").as_str())
+            && !words.contains(&format!("{module}.rs").as_str())
+        {
+            problems.push(format!("docs/ARCHITECTURE.md: no line for {module}"));
+        }
+    }
+    let is_there = |word: &str| {
+        let (word, root) = (word.trim_end_matches([',', ';']), Path::new(env!("CARGO_MANIFEST_DIR")));
+        files.iter().any(|file| file.path.ends_with(word)) || root.join("formats").join(word).exists()
+    };
+    let tests = ["tidy.rs", "hostile.rs"];
+    for word in words.iter().filter(|word| word.ends_with(".rs") && !tests.contains(word)) {
+        if !is_there(word) {
+            problems.push(format!("docs/ARCHITECTURE.md: there is no {word}"));
+        }
+    }
+    // These two say of every file what it is for.
+    for folder in ["src/pipeline", "src/cli"] {
+        for file in files.iter().filter(|file| file.path.parent().unwrap().ends_with(folder)) {
+            let name = file.path.file_name().unwrap().to_str().unwrap();
+            if name != "mod.rs" && !words.contains(&name) {
+                problems.push(format!("docs/ARCHITECTURE.md: no word about {folder}/{name}"));
+            }
         }
     }
     report(&problems);
@@ -227,8 +293,7 @@ fn nothing_forbidden_outside_tests() {
 
 #[test]
 fn every_option_of_the_drop_in_is_in_the_compatibility_page() {
-    let page =
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/COMPATIBILITY.md")).unwrap();
+    let page = page("COMPATIBILITY.md");
     let help = common::Scratch::new().run(common::DENSIFY, &["--help"]).stdout;
     let mut names: Vec<String> = help
         .lines()
