@@ -189,6 +189,7 @@ Examples:
 
 /// Say what a file holds: scene, depth map, cloud, class table, label map
 #[derive(Clone, Debug, Args)]
+#[command(after_help = INSPECT_EXAMPLES)]
 pub(crate) struct InspectArgs {
     /// The file
     #[arg(value_name = "FILE")]
@@ -197,6 +198,11 @@ pub(crate) struct InspectArgs {
     #[arg(long)]
     pub(crate) json: bool,
 }
+
+const INSPECT_EXAMPLES: &str = "\
+Examples:
+  semvs inspect scene.mvs
+  semvs inspect depthmaps/depth0000.dmap --json";
 
 /// Hold a cloud against the true surface: accuracy, completeness, F1, gross errors, labels
 #[derive(Clone, Debug, Args)]
