@@ -9,6 +9,7 @@ mod bad_input;
 mod colmap;
 mod command_line;
 mod compare;
+mod corners;
 mod exact_runs;
 mod exchange;
 mod pipelines;

@@ -1,9 +1,6 @@
 //! Corners of DensifyPointCloud where a scene or its files could lose something without a word.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may")]
 
-mod common;
-
-use common::Scratch;
+use crate::common::{self, Scratch};
 use semvs_formats::Limits;
 use semvs_formats::mvs::{Container, SceneFile};
 use semvs_formats::ply::{self, Cloud, Encoding, Field, Layout, PlyWriter, TypeNames};
