@@ -78,7 +78,7 @@ const POINTS_PER_CHUNK: usize = 4096;
 /// `policy` tells for which classes there can be a file.
 ///
 /// # Errors
-/// As [`check_writable`]; options about labels without a class table.
+/// A place that cannot be written; options about labels without a class table.
 pub fn check_cloud_paths(
     path: &Path,
     options: &CloudOptions<'_>,
