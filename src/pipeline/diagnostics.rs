@@ -1,6 +1,7 @@
 //! What verbose runs leave beside their results.
 
 use super::estimate::for_each_view;
+use super::filter::valid_depths;
 use super::prepare::Prepared;
 use crate::error::Result;
 use crate::fusion::{FusionMaps, project_maps};
@@ -29,12 +30,17 @@ pub(super) fn leave_pictures(
         if let Some(confidence) = estimate.confidence.as_ref().filter(|_| stage.is_empty()) {
             write_picture(&beside("conf.png"), confidence, false)?;
         }
+        let points = valid_depths(&estimate.depth) as u64;
+        if points == 0 {
+            return Ok(());
+        }
         let color = prepared.images.color(view, estimate.depth.size())?;
         let maps = FusionMaps { color: Some(color), ..FusionMaps::new(estimate) };
         let layout = CloudLayout { normals: true, colors: true, ..CloudLayout::default() };
-        let mut cloud = ViewCloud::default();
+        let path = beside(&format!("{stage}.ply")[1..]);
+        let mut cloud = ViewCloud::create(&path, points)?;
         project_maps(view, &maps, None, layout, &mut cloud)?;
-        cloud.write(&beside(&format!("{stage}.ply")[1..]))
+        cloud.finish()
     })
 }
 

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::scene::{CloudPoint, Grid, PointSink};
 use image::{GrayImage, ImageFormat};
-use semvs_formats::ply::{self, Cloud, Encoding, Field, Layout, TypeNames};
+use semvs_formats::ply::{Cloud, Encoding, Field, Layout, PlyWriter, TypeNames};
 use std::fmt::Write as _;
 use std::io::Cursor;
 use std::path::Path;
@@ -42,41 +42,52 @@ pub fn write_picture(path: &Path, plane: &Grid<f32>, near_is_bright: bool) -> Re
     write_file(path, bytes.get_ref())
 }
 
-/// The points of one view.
-#[derive(Debug, Default)]
-pub struct ViewCloud {
-    cloud: Cloud,
+/// The points of one view on their way into a PLY file: position, normal, colour.
+pub struct ViewCloud<'a> {
+    path: &'a Path,
+    writer: PlyWriter<AtomicFile>,
+    chunk: Cloud,
 }
 
-impl PointSink for ViewCloud {
-    fn push(&mut self, point: &CloudPoint<'_>) -> Result<()> {
-        self.cloud.positions.push(point.position);
-        self.cloud.normals.push(point.normal);
-        self.cloud.colors.push(point.color);
-        Ok(())
-    }
-}
-
-impl ViewCloud {
-    /// Writes the points as PLY: position, normal, colour. Without points there is no file.
+impl<'a> ViewCloud<'a> {
+    /// Starts the file at `path`, which will hold `points` points.
     ///
     /// # Errors
     /// [`Error`] about `path` if it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        if self.cloud.positions.is_empty() {
-            return Ok(());
-        }
+    pub fn create(path: &'a Path, points: u64) -> Result<Self> {
         let layout = Layout {
             encoding: Encoding::LittleEndian,
             type_names: TypeNames::Sized,
             fields: vec![Field::Position, Field::Normal, Field::Color],
             comments: Vec::new(),
         };
-        let failed = |error: semvs_formats::Error| Error::writing(path, error);
-        let count = self.cloud.positions.len() as u64;
-        let mut writer = ply::PlyWriter::new(AtomicFile::create(path)?, &layout, count).map_err(failed)?;
-        writer.write(&self.cloud).map_err(failed)?;
-        writer.finish().map_err(failed)?.commit()
+        let writer = PlyWriter::new(AtomicFile::create(path)?, &layout, points);
+        Ok(ViewCloud { path, writer: writer.map_err(|e| Error::writing(path, e))?, chunk: Cloud::default() })
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.writer.write(&self.chunk).map_err(|e| Error::writing(self.path, e))?;
+        self.chunk.clear();
+        Ok(())
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`Error`] about the file, also when it did not get its points.
+    pub fn finish(mut self) -> Result<()> {
+        self.flush()?;
+        self.writer.finish().map_err(|e| Error::writing(self.path, e))?.commit()
+    }
+}
+
+impl PointSink for ViewCloud<'_> {
+    fn push(&mut self, point: &CloudPoint<'_>) -> Result<()> {
+        const CHUNK: usize = 4096;
+        self.chunk.positions.push(point.position);
+        self.chunk.normals.push(point.normal);
+        self.chunk.colors.push(point.color);
+        if self.chunk.positions.len() == CHUNK { self.flush() } else { Ok(()) }
     }
 }
 
