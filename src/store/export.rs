@@ -37,7 +37,8 @@ pub fn interface_archive(
 }
 
 /// The archive that OpenMVS leaves after densification in project mode: as [`interface_archive`], but with the dense
-/// `cloud` in place of the sparse points, platform names, and the working size of every processed image.
+/// `cloud` in place of the sparse points, platform names, the working size of every processed image, and the mesh that a
+/// project brought along.
 ///
 /// # Errors
 /// Those of `cloud`.
@@ -74,6 +75,7 @@ pub fn project_archive(
         Ok(())
     })?;
     archive.points = points;
+    archive.mesh.clone_from(&loaded.archive.mesh);
     Ok(archive)
 }
 
