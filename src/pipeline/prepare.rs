@@ -93,7 +93,7 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
         use_tower(&mut loaded, tower, &job.neighbors, progress)?;
     }
     if let Some(path) = &job.view_neighbors_file {
-        override_from_file(&mut loaded.scene, path)?;
+        override_from_file(&mut loaded.scene, path, progress)?;
     }
     Ok(loaded)
 }

@@ -1,6 +1,7 @@
 //! Sparse points and neighbours from files of their own.
 
 use crate::error::{Error, Result};
+use crate::progress::Progress;
 use crate::scene::{Scene, Tracks, ViewIndex, override_neighbors};
 use crate::store::import::LoadedScene;
 use semvs_formats::{Limits, mvs, neighbors_file, ply};
@@ -50,7 +51,7 @@ pub(super) fn replace_points(loaded: &mut LoadedScene, path: &Path) -> Result<()
 ///
 /// # Errors
 /// An unreadable file, an image that is not in the scene.
-pub(super) fn override_from_file(scene: &mut Scene, path: &Path) -> Result<()> {
+pub(super) fn override_from_file(scene: &mut Scene, path: &Path, progress: &Progress) -> Result<()> {
     let file = neighbors_file::read(path, scene.views.len(), &Limits::default());
     let file = file.map_err(|e| Error::format(path, e))?;
     let lists: Vec<(ViewIndex, Vec<ViewIndex>)> = file
@@ -58,5 +59,11 @@ pub(super) fn override_from_file(scene: &mut Scene, path: &Path) -> Result<()> {
         .iter()
         .map(|list| (ViewIndex(list.image), list.neighbors.iter().map(|&n| ViewIndex(n)).collect()))
         .collect();
+    if let Some(first) = file.alone.first() {
+        let (path, count) = (path.display(), file.alone.len());
+        progress.warn(format!(
+            "{path}: {count} images stand alone in their line, such as {first}; their neighbours do not change"
+        ));
+    }
     override_neighbors(scene, &lists)
 }

@@ -162,3 +162,13 @@ fn a_scene_without_sparse_points_is_densified() {
     scratch.densify_point_cloud(words).ok();
     assert_eq!(scratch.read("scene_dense.ply"), first);
 }
+
+#[test]
+fn images_alone_in_a_neighbour_file_are_told_of() {
+    let scratch = Scratch::facade6();
+    scratch.write("pairs.txt", "0 1 2\n3\n1 0\n");
+    let words = "scene.mvs --view-neighbors-file pairs.txt --output-view-neighbors-file out.txt";
+    let outcome = scratch.densify_point_cloud(words).ok();
+    assert!(outcome.stdout.contains("pairs.txt: 1 images stand alone"), "{}", outcome.stdout);
+    assert_eq!(scratch.read("out.txt"), b"0 1 2\n1 0\n2\n3\n4\n5\n");
+}
