@@ -29,6 +29,7 @@
 pub mod colmap;
 pub mod dmap;
 mod error;
+pub mod las;
 pub mod mvs;
 pub mod neighbors_file;
 pub mod npy;

@@ -1,5 +1,6 @@
 //! The options about semantic labels and the labelled outputs, as typed.
 
+use super::values::{boolean, offset};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -34,23 +35,41 @@ pub(crate) struct LabelInput {
     pub(crate) unknown_label: WhenMissing,
 }
 
-/// What is written besides the cloud, and how.
+/// The forms of the clouds that are written.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct LabelOutput {
+pub(crate) struct CloudForms {
     /// Also write one cloud per class: OUT.<class>.ply
     #[arg(long)]
     pub(crate) split_by_class: bool,
     /// Also write the cloud in the colours of its classes: OUT.labels.ply
     #[arg(long)]
     pub(crate) color_by_label: bool,
-    /// Write a summary of the run as JSON
-    #[arg(long, value_name = "FILE")]
-    pub(crate) report: Option<PathBuf>,
-    /// What the cloud holds of every point besides its label [default: plain in semvs, openmvs in
+    /// What a PLY cloud holds of every point besides its label [default: plain in semvs, openmvs in
     /// DensifyPointCloud]
     #[arg(long, value_name = "LAYOUT", value_enum)]
     pub(crate) ply_layout: Option<PlyLayout>,
+    /// Write PLY clouds with 64-bit coordinates
+    #[arg(long)]
+    pub(crate) ply_doubles: bool,
+    /// Add this to the coordinates of clouds that have the digits for it (.las, .laz, --ply-doubles), such as
+    /// 500000,5200000,0 [default: where the scene's transform says]
+    #[arg(long, value_name = "X,Y,Z", value_parser = offset, allow_hyphen_values = true)]
+    pub(crate) offset: Option<[f64; 3]>,
+    /// Normals in .las and .laz clouds, as extra bytes
+    #[arg(long, value_name = "0|1", default_value = "1", value_parser = boolean, action = clap::ArgAction::Set)]
+    pub(crate) las_normals: bool,
+}
+
+/// What is written besides the scene, and how.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct LabelOutput {
+    #[command(flatten)]
+    pub(crate) clouds: CloudForms,
+    /// Write a summary of the run as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
 }
 
 /// Both groups.

@@ -1,12 +1,14 @@
 //! From options as typed to jobs whose values are checked.
 
 use super::dense_config::{self, DenseConfig};
-use super::label_options::{ConsistencyMode, LabelInput, LabelOutput, PlyLayout as TypedLayout, WhenMissing};
+use super::label_options::{CloudForms, ConsistencyMode, LabelInput, PlyLayout as TypedLayout, WhenMissing};
 use super::options::{FilterKind, SharedOptions};
 use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions};
-use crate::pipeline::{AcrossViews, FilterJob, LabelJob, MaskJob, RoiJob, SceneJob, TowerJob, TowerWork};
+use crate::pipeline::{
+    AcrossViews, FilterJob, LabelJob, MaskJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork,
+};
 use crate::scene::{NeighborOptions, OutsideRoi, PairingOptions, ResolutionOptions, RoiEstimation};
 use crate::semantics::{ClassRules, Consistency};
 use crate::stereo::{CpuLevel, StereoOptions};
@@ -279,17 +281,21 @@ fn table(name: &str, place: &dyn Fn(&Path) -> PathBuf) -> String {
     }
 }
 
-/// The layout of clouds, `default` where none is typed.
-pub(crate) fn layout(typed: &LabelOutput, default: PlyLayout) -> PlyLayout {
-    typed.ply_layout.map_or(default, typed_layout)
-}
-
-/// The layout of that name.
-pub(crate) fn typed_layout(typed: TypedLayout) -> PlyLayout {
-    match typed {
-        TypedLayout::Plain => PlyLayout::Plain,
-        TypedLayout::Openmvs => PlyLayout::OpenMvs,
-        TypedLayout::Odm => PlyLayout::Odm,
+/// The outputs of a run that writes `cloud` alone, in the forms that are typed, with `layout` where none is.
+pub(crate) fn outputs(typed: &CloudForms, cloud: PathBuf, layout: PlyLayout) -> Outputs {
+    Outputs {
+        layout: match typed.ply_layout {
+            Some(TypedLayout::Plain) => PlyLayout::Plain,
+            Some(TypedLayout::Openmvs) => PlyLayout::OpenMvs,
+            Some(TypedLayout::Odm) => PlyLayout::Odm,
+            None => layout,
+        },
+        split_by_class: typed.split_by_class,
+        color_by_label: typed.color_by_label,
+        offset: typed.offset,
+        ply_doubles: typed.ply_doubles,
+        las_normals: typed.las_normals,
+        ..Outputs::of(cloud)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The command line of `semvs`, as typed.
 
 use super::exchange_args::{ExportArgs, ImportArgs};
-use super::label_options::{LabelInput, PlyLayout};
+use super::label_options::{CloudForms, LabelInput};
 use super::options::SharedOptions;
 use crate::store::colmap::Pass;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -65,7 +65,7 @@ pub(crate) struct DensifyArgs {
     /// image_undistorter
     #[arg(value_name = "SCENE.mvs")]
     pub(crate) scene: PathBuf,
-    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene; semvs/dense.ply in a COLMAP folder, with the
+    /// Cloud to write, .ply, .las or .laz [default: SCENE_dense.ply beside the scene; semvs/dense.ply in a COLMAP folder, with the
     /// depth maps]
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
     pub(crate) output: Option<PathBuf>,
@@ -103,7 +103,7 @@ pub(crate) struct FuseArgs {
     /// Which maps of a COLMAP folder [default: geometric, if there are any]
     #[arg(long, value_name = "PASS", value_enum, conflicts_with = "depth_maps")]
     pub(crate) maps: Option<ColmapPass>,
-    /// Cloud to write, .ply [default: SCENE_dense.ply beside the scene; semvs/dense.ply in a COLMAP folder]
+    /// Cloud to write, .ply, .las or .laz [default: SCENE_dense.ply beside the scene; semvs/dense.ply in a COLMAP folder]
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
@@ -159,7 +159,7 @@ pub(crate) struct ConvertArgs {
     /// Depth maps (.dmap)
     #[arg(value_name = "FILE.dmap", required = true)]
     pub(crate) depth_maps: Vec<PathBuf>,
-    /// Cloud to write, .ply
+    /// Cloud to write, .ply, .las or .laz
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT")]
     pub(crate) output: PathBuf,
     /// Folder that the image names in the depth maps are relative to [default: the folder of each depth map,
@@ -168,15 +168,8 @@ pub(crate) struct ConvertArgs {
     pub(crate) working_folder: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) labels: LabelInput,
-    /// Also write one cloud per class: OUT.<class>.ply
-    #[arg(long)]
-    pub(crate) split_by_class: bool,
-    /// Also write the cloud in the colours of its classes: OUT.labels.ply
-    #[arg(long)]
-    pub(crate) color_by_label: bool,
-    /// What the cloud holds of every point besides its label
-    #[arg(long, value_name = "LAYOUT", value_enum, default_value_t = PlyLayout::Plain)]
-    pub(crate) ply_layout: PlyLayout,
+    #[command(flatten)]
+    pub(crate) clouds: CloudForms,
 }
 
 /// Label options that say how labels restrict fusion; refused where nothing is fused.

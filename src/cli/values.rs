@@ -11,6 +11,14 @@ pub(crate) fn boolean(text: &str) -> Result<bool, String> {
     }
 }
 
+/// Three finite numbers separated by commas.
+pub(crate) fn offset(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    let offset = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    offset.ok_or_else(|| "expected three numbers separated by commas, 500000,5200000,0".to_owned())
+}
+
 /// A path as OpenMVS's tools take it: surrounding double quotes are dropped, backslashes are slashes.
 pub(crate) fn openmvs_path(typed: &Path) -> PathBuf {
     match typed.to_str() {
@@ -52,6 +60,14 @@ mod tests {
         }
         assert!(boolean("2").is_err());
         assert!(boolean("").is_err());
+    }
+
+    #[test]
+    fn offsets_are_three_numbers() {
+        assert_eq!(offset("500000.5, -2,0"), Ok([500_000.5, -2.0, 0.0]));
+        for text in ["", "1,2", "1,2,3,4", "1,2,x", "1,2,inf", "1 2 3"] {
+            assert!(offset(text).is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -1,13 +1,15 @@
-//! Cameras, boxes, nearest points. Knows no files and no scenes.
+//! Cameras, boxes, places, nearest points. Knows no files and no scenes.
 
 mod camera;
 mod lens;
 mod nearest;
+mod placement;
 mod roi;
 mod similarity;
 
 pub use camera::{Camera, Size, normalized_k};
 pub(crate) use lens::Lens;
 pub(crate) use nearest::{Nearest, NearestIndex};
+pub use placement::Placement;
 pub use roi::Roi;
 pub use similarity::is_similar_depth;

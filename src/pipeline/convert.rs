@@ -6,7 +6,7 @@ use super::outputs::{check_places, cloud_rows, write_cloud};
 use super::skip::Labels;
 use crate::error::{Error, Result};
 use crate::fusion::{FusionMaps, project_maps};
-use crate::geometry::Size;
+use crate::geometry::{Placement, Size};
 use crate::progress::Progress;
 use crate::report::{OutputReport, RunReport};
 use crate::scene::{CloudLayout, DepthEstimate, PointSource, ResolutionOptions, ViewIndex};
@@ -39,7 +39,7 @@ pub struct ConvertJob {
 /// # Errors
 /// An unreadable file, or an output that cannot be written.
 pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
-    job.outputs.check_labels(job.labels.is_some())?;
+    job.outputs.check(job.labels.is_some())?;
     let classes = job.labels.as_ref().map(Classes::of).transpose()?;
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
     check_once_each(&job.depth_maps)?;
@@ -67,7 +67,7 @@ pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
         progress.detail(format!("{}: {points} points", map.path.display()));
     }
     let cloud = spool.finish()?;
-    let written = write_cloud(&job.outputs, &cloud, labels.as_ref(), progress)?;
+    let written = write_cloud(&job.outputs, &cloud, labels.as_ref(), Placement::default(), progress)?;
     let outputs: Vec<OutputReport> = cloud_rows(&written, labels.as_ref());
     Ok(RunReport { points: cloud.len(), outputs, ..RunReport::default() })
 }

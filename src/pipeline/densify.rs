@@ -7,7 +7,7 @@ use super::fusing::{Fused, fuse_maps, possible};
 use super::inputs::{Classes, check_inputs, named_files};
 use super::job::{DensifyJob, SceneJob};
 use super::outputs::{
-    check_depth_maps, check_places, check_report, class_rows, cloud_rows, write_cloud, write_scene,
+    check_depth_maps, check_places, check_report, class_rows, cloud_rows, placement, write_cloud, write_scene,
 };
 use super::prepare::{Prepared, load, name_unmatched, pixels_in_hand, prepare};
 use super::record::{Clock, view_rows, with_threads};
@@ -183,7 +183,8 @@ fn finish_depth_maps(
             // Sparse points need not have what it takes.
             outputs.layout = PlyLayout::OpenMvsProject;
         }
-        let written = write_cloud(&outputs, &sparse, None, progress)?;
+        let place = placement(&outputs, &prepared.loaded.archive, progress);
+        let written = write_cloud(&outputs, &sparse, None, place, progress)?;
         report.outputs.extend(cloud_rows(&written, None));
     }
     write_scene(&job.outputs, prepared, &sparse, progress)?;
@@ -239,7 +240,8 @@ pub(super) fn write_results(
         Some(cloud) => cloud,
         None => &fused.cloud,
     };
-    let written = write_cloud(outputs, cloud, labels, progress)?;
+    let place = placement(outputs, &prepared.loaded.archive, progress);
+    let written = write_cloud(outputs, cloud, labels, place, progress)?;
     report.points = fused.cloud.len();
     report.outputs.extend(cloud_rows(&written, labels));
     if let Some(labels) = labels {

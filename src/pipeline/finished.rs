@@ -1,7 +1,7 @@
 //! Work on the cloud that a scene already has: filter it by visibility, take its well-seen points, tell their scale.
 
 use super::job::{Outputs, SceneArchive, SceneJob};
-use super::outputs::{check_places, cloud_rows, summary, write_archive, write_cloud};
+use super::outputs::{check_places, cloud_rows, placement, summary, write_archive, write_cloud};
 use super::prepare::load;
 use super::record::with_threads;
 use crate::cloud_filter::{PointViews, point_scales, point_visibility, swap_removed};
@@ -52,7 +52,9 @@ pub fn finished_cloud(job: &CloudJob, progress: &Progress) -> Result<RunReport> 
 
 fn run(job: &CloudJob, progress: &Progress) -> Result<RunReport> {
     let start = Instant::now();
-    check_places(&job.outputs.without_labels(), None)?;
+    let outputs = job.outputs.without_labels();
+    outputs.check(false)?;
+    check_places(&outputs, None)?;
     let loaded = load(&job.input, progress)?;
     let points = &loaded.archive.points;
     if job.work != CloudWork::Export && (points.positions.is_empty() || points.views.is_empty()) {
@@ -110,7 +112,9 @@ fn keep(
     if matches!(job.work, CloudWork::WellSeen(_)) {
         cloud = cloud.always_colored();
     }
-    let written = write_cloud(&job.outputs.without_labels(), &cloud, None, progress)?;
+    let outputs = job.outputs.without_labels();
+    let place = placement(&outputs, &loaded.archive, progress);
+    let written = write_cloud(&outputs, &cloud, None, place, progress)?;
     report.points = cloud.len();
     report.outputs.extend(cloud_rows(&written, None));
     if let Some(path) = &job.outputs.scene {

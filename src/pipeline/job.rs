@@ -7,7 +7,7 @@ use crate::report::OutputReport;
 use crate::scene::{NeighborOptions, ResolutionOptions, RoiEstimation};
 use crate::semantics::ClassRules;
 use crate::stereo::StereoOptions;
-use crate::store::cloud::PlyLayout;
+use crate::store::cloud::{CloudFormat, PlyLayout};
 use crate::store::colmap::Pass;
 use crate::store::labels::LabelSources;
 use semvs_formats::mvs::ArchiveKind;
@@ -204,6 +204,12 @@ pub struct Outputs {
     pub split_by_class: bool,
     /// A cloud in class colours.
     pub color_by_label: bool,
+    /// Where clouds with more than single precision go, from the scene's origin; `None` = where the scene's transform says.
+    pub offset: Option<[f64; 3]>,
+    /// 64-bit coordinates in PLY files.
+    pub ply_doubles: bool,
+    /// Normals in LAS and LAZ files.
+    pub las_normals: bool,
     /// JSON summary.
     pub report: Option<PathBuf>,
     /// Name the images in the scene from the scene's folder, so that it can be used from anywhere; else from the
@@ -228,16 +234,42 @@ pub enum SceneArchive {
 }
 
 impl Outputs {
+    /// `cloud` alone, with the default of everything.
+    pub fn of(cloud: PathBuf) -> Self {
+        Outputs {
+            cloud,
+            scene: None,
+            archive: SceneArchive::Interface,
+            layout: PlyLayout::Plain,
+            split_by_class: false,
+            color_by_label: false,
+            offset: None,
+            ply_doubles: false,
+            las_normals: true,
+            report: None,
+            names_from_scene: true,
+            sparse_cloud: false,
+            allow_empty: false,
+        }
+    }
+
     /// The same without what needs labels.
     pub(super) fn without_labels(&self) -> Outputs {
         Outputs { split_by_class: false, color_by_label: false, ..self.clone() }
     }
 
-    /// Refuses outputs by class in a run without labels.
+    /// Refuses outputs by class in a run without labels, and an offset that would cost digits.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the option.
-    pub(super) fn check_labels(&self, has_labels: bool) -> Result<()> {
+    pub(super) fn check(&self, has_labels: bool) -> Result<()> {
+        if let Some(offset) = self.offset.filter(|offset| *offset != [0.0; 3] && !self.are_precise()) {
+            let [x, y, z] = offset;
+            return Err(Error::invalid(format!(
+                "--offset {x},{y},{z} needs coordinates of more than 32 bits: end the name of the cloud in .las or .laz, or \
+                 add --ply-doubles"
+            )));
+        }
         let asked = [(self.split_by_class, "--split-by-class"), (self.color_by_label, "--color-by-label")];
         match asked.iter().find(|(asked, _)| *asked && !has_labels) {
             Some((_, option)) => Err(Error::invalid(format!(
@@ -246,6 +278,11 @@ impl Outputs {
             ))),
             None => Ok(()),
         }
+    }
+
+    /// Whether the cloud's coordinates have more digits than single precision holds.
+    pub(super) fn are_precise(&self) -> bool {
+        self.ply_doubles || CloudFormat::of(&self.cloud).is_precise()
     }
 
     /// Folder of the cloud.
@@ -290,7 +327,7 @@ impl DensifyJob {
         self.stereo.check()?;
         self.filter.options.check()?;
         self.fusion.check()?;
-        self.outputs.check_labels(self.input.labels.is_some())
+        self.outputs.check(self.input.labels.is_some())
     }
 }
 
@@ -303,6 +340,6 @@ impl FuseJob {
         self.input.check()?;
         self.resolution.as_ref().map_or(Ok(()), ResolutionOptions::check)?;
         self.fusion.check()?;
-        self.outputs.check_labels(self.input.labels.is_some())
+        self.outputs.check(self.input.labels.is_some())
     }
 }

@@ -5,7 +5,7 @@ use super::prepare::Prepared;
 use super::skip::Labels;
 use crate::error::{Error, Result};
 use crate::fusion::FusionSummary;
-use crate::geometry::Camera;
+use crate::geometry::{Camera, Placement};
 use crate::progress::{Event, Progress, SceneSummary};
 use crate::report::{ClassRow, OutputReport, fill_shares};
 use crate::scene::PointSource;
@@ -84,10 +84,37 @@ fn cloud_options<'a>(outputs: &Outputs, table: Option<&'a ClassTable>) -> CloudO
         table,
         split_by_class: outputs.split_by_class,
         color_by_label: outputs.color_by_label,
+        doubles: outputs.ply_doubles,
+        las_without_normals: !outputs.las_normals,
+        placement: Placement::default(),
     }
 }
 
-/// Writes the cloud in all its forms.
+/// Where the points of a scene go: by the offset that was given, else by its transform, if the cloud's coordinates have the
+/// digits for either.
+pub(super) fn placement(outputs: &Outputs, archive: &mvs::Scene, progress: &Progress) -> Placement {
+    if !outputs.are_precise() {
+        return Placement::default();
+    }
+    if let Some(offset) = outputs.offset {
+        return Placement::shift(offset);
+    }
+    let Some(placement) = Placement::undoing(&archive.transform) else {
+        progress
+            .warn("the scene's transform is no similarity and is left alone; --offset says where clouds go");
+        return Placement::default();
+    };
+    if !placement.is_identity() {
+        let [x, y, z] = placement.offset();
+        let how = if placement.turns() { "turned, scaled and moved" } else { "moved" };
+        progress.info(format!(
+            "the cloud is {how} by the scene's transform, its origin to ({x}, {y}, {z}); --offset 0,0,0 leaves it in place"
+        ));
+    }
+    placement
+}
+
+/// Writes the cloud in all its forms, its points where `placement` says.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -95,11 +122,12 @@ pub(super) fn write_cloud(
     outputs: &Outputs,
     cloud: &dyn PointSource,
     labels: Option<&Labels>,
+    placement: Placement,
     progress: &Progress,
 ) -> Result<WrittenClouds> {
     let start = Instant::now();
-    let written =
-        write_clouds(cloud, &outputs.cloud, &cloud_options(outputs, labels.map(Labels::table)), progress)?;
+    let options = CloudOptions { placement, ..cloud_options(outputs, labels.map(Labels::table)) };
+    let written = write_clouds(cloud, &outputs.cloud, &options, progress)?;
     for file in &written.files {
         progress.event(Event::CloudSaved {
             path: file.path.clone(),
@@ -175,15 +203,17 @@ pub(super) fn cloud_rows(written: &WrittenClouds, labels: Option<&Labels>) -> Ve
         _ if label_colors => "dense cloud in class colours".to_owned(),
         _ => "dense cloud".to_owned(),
     };
-    written
-        .files
-        .iter()
-        .map(|file| OutputReport {
-            path: file.path.display().to_string(),
-            content: content(file.class, file.label_colors),
-            points: Some(file.points),
-        })
-        .collect()
+    let clouds = written.files.iter().map(|file| OutputReport {
+        path: file.path.display().to_string(),
+        content: content(file.class, file.label_colors),
+        points: Some(file.points),
+    });
+    let legend = written.legend.iter().map(|path| OutputReport {
+        path: path.display().to_string(),
+        content: "legend of the classes".to_owned(),
+        points: None,
+    });
+    clouds.chain(legend).collect()
 }
 
 /// What became of every class: pixels as fusion saw them, points as written.

@@ -183,6 +183,20 @@ impl ClassTable {
         }
     }
 
+    /// The ASPRS LAS classification code of a class: the table's, else 64 + id, the first of the codes that users may
+    /// define; void is 1, unclassified. `None`: 64 + id is beyond 255.
+    pub fn las_code(&self, id: ClassId) -> Option<u8> {
+        /// Code of what has been looked at without result.
+        const UNCLASSIFIED: u8 = 1;
+        /// First code that users may define.
+        const FIRST_OF_USERS: u16 = 64;
+        match self.get(id).and_then(|class| class.las) {
+            _ if id.is_void() => Some(UNCLASSIFIED),
+            Some(code) => Some(code),
+            None => id.0.checked_add(FIRST_OF_USERS).and_then(|code| u8::try_from(code).ok()),
+        }
+    }
+
     /// Every colour that may occur in a label map, with its class.
     ///
     /// Black is void unless the table uses it otherwise.
@@ -388,6 +402,17 @@ mod tests {
         assert_eq!(met.color(ClassId(300)), table.color(ClassId(300)));
         let facade = builtin("3dom-facade");
         assert_eq!(facade.with_ids([ClassId(9)]), facade);
+    }
+
+    #[test]
+    fn las_codes_are_the_tables_else_those_for_users() {
+        let facade = builtin("3dom-facade");
+        let codes: Vec<_> = (0..=5).map(|id| facade.las_code(ClassId(id))).collect();
+        assert_eq!(codes, [1, 6, 66, 67, 68, 69].map(Some));
+        let ids = builtin("ids");
+        assert_eq!((ids.las_code(ClassId(191)), ids.las_code(ClassId(192))), (Some(255), None));
+        assert_eq!(ids.las_code(ClassId(u16::MAX)), None);
+        assert_eq!(builtin("ade20k").las_code(ClassId(150)), Some(214));
     }
 
     #[test]

@@ -1,13 +1,19 @@
-//! Dense clouds as PLY files: the cloud, its parts by class, and the cloud in the colours of its classes.
+//! Dense clouds as files: the cloud, its parts by class, and the cloud in the colours of its classes.
 
 use super::atomic::{AtomicFile, check_writable};
-use super::cloud_names::{class_paths, label_colors_path};
+pub use super::cloud_names::CloudFormat;
+use super::cloud_names::{class_paths, label_colors_path, legend_path};
+use super::cloud_output::{Columns, Output};
+use super::las_cloud::{LasColumns, check_codes};
+use super::legend::write_legend;
+use super::ply_cloud::ply_layout;
 use super::stale_clouds::stale_clouds;
+use super::survey::{Survey, survey};
 use crate::error::{Error, Result};
+use crate::geometry::Placement;
 use crate::progress::Progress;
-use crate::scene::{CloudLayout, CloudPoint, PointSource};
+use crate::scene::{CloudLayout, PointSource};
 use crate::semantics::{ClassId, ClassPolicy, ClassTable};
-use semvs_formats::ply::{self, Cloud, PlyWriter};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +42,12 @@ pub struct CloudOptions<'a> {
     pub split_by_class: bool,
     /// One more cloud in the colours of the classes. Default: false.
     pub color_by_label: bool,
+    /// 64-bit coordinates in PLY files. Default: false.
+    pub doubles: bool,
+    /// No normals in LAS and LAZ files, where they are extra bytes. Default: false.
+    pub las_without_normals: bool,
+    /// Where the points go. Default: they stay.
+    pub placement: Placement,
 }
 
 /// A cloud on disk.
@@ -67,31 +79,37 @@ pub struct WrittenClouds {
     pub files: Vec<WrittenCloud>,
     /// Points by class; empty without labels.
     pub classes: BTreeMap<ClassId, ClassPoints>,
+    /// The picture that says what the class colours mean; `None` without labels.
+    pub legend: Option<PathBuf>,
 }
 
 /// Files that are written in one pass over the points.
 const FILES_PER_PASS: usize = 16;
-/// Points that a file's columns hold before they are encoded.
-const POINTS_PER_CHUNK: usize = 4096;
 
 /// Checks before long work that the files can be written: the cloud at `path`, and what `options` ask for besides.
 /// `policy` tells for which classes there can be a file.
 ///
 /// # Errors
-/// A place that cannot be written; options about labels without a class table.
+/// A place that cannot be written; options about labels without a class table; a class without a LAS code.
 pub fn check_cloud_paths(
     path: &Path,
     options: &CloudOptions<'_>,
     policy: Option<&ClassPolicy>,
 ) -> Result<()> {
     check_writable(path)?;
+    let is_kept = |id: &ClassId| policy.is_none_or(|policy| policy.is_kept(*id));
+    if let Some(table) = options.table {
+        check_writable(&legend_path(path))?;
+        if CloudFormat::of(path) != CloudFormat::Ply {
+            check_codes(table, is_kept)?;
+        }
+    }
     if options.color_by_label {
         options.needed_table()?;
         check_writable(&label_colors_path(path))?;
     }
     if options.split_by_class {
         let table = options.needed_table()?;
-        let is_kept = |id: &ClassId| policy.is_none_or(|policy| policy.is_kept(*id));
         let ids: Vec<ClassId> =
             std::iter::once(ClassId::VOID).chain(table.classes().iter().map(|c| c.id)).collect();
         let kept: Vec<ClassId> = ids.into_iter().filter(is_kept).collect();
@@ -101,7 +119,8 @@ pub fn check_cloud_paths(
 }
 
 /// Writes `source` to `path` and, as `options` ask, its parts by class and a copy in class colours beside it. The
-/// parts together hold exactly the points of the whole, in its order; a class without points has no file.
+/// parts together hold exactly the points of the whole, in its order; a class without points has no file. Labelled points
+/// get a legend of their classes.
 ///
 /// An empty cloud is not written, which is warned of: what is at `path` stays.
 ///
@@ -123,15 +142,19 @@ pub fn write_clouds(
     if !has.labels && (options.split_by_class || options.color_by_label) {
         return Err(options.needs_labels());
     }
-    let classes = if has.labels { count_classes(source)? } else { BTreeMap::new() };
-    let jobs = jobs(source, path, options, &classes)?;
+    let survey = survey(source, has.labels, CloudFormat::of(path) != CloudFormat::Ply, &options.placement)?;
+    let jobs = jobs(source, path, options, &survey)?;
     let mut files = Vec::new();
     for pass in jobs.chunks(FILES_PER_PASS) {
-        write_pass(source, pass, options.table)?;
+        write_pass(source, pass, options)?;
         files.extend(pass.iter().map(|job| job.file.clone()));
     }
+    let legend = options.table.filter(|_| has.labels).map(|table| {
+        let legend = legend_path(path);
+        write_legend(&legend, table, &survey.classes).map(|()| legend)
+    });
     warn_of_stale(path, &files, progress);
-    Ok(WrittenClouds { files, classes })
+    Ok(WrittenClouds { files, classes: survey.classes, legend: legend.transpose()? })
 }
 
 /// Clouds by class of an earlier run stay, but do not belong to this one.
@@ -155,21 +178,10 @@ impl<'a> CloudOptions<'a> {
     }
 }
 
-fn count_classes(source: &dyn PointSource) -> Result<BTreeMap<ClassId, ClassPoints>> {
-    let mut classes: BTreeMap<ClassId, ClassPoints> = BTreeMap::new();
-    source.for_each(&mut |point| {
-        let class = classes.entry(ClassId(point.label)).or_default();
-        class.points += 1;
-        class.confidence_sum += f64::from(point.label_confidence);
-        Ok(())
-    })?;
-    Ok(classes)
-}
-
 /// A file to write.
-struct Job {
-    file: WrittenCloud,
-    layout: ply::Layout,
+pub(super) struct Job {
+    pub(super) file: WrittenCloud,
+    pub(super) columns: Columns,
 }
 
 /// The files to write, the whole cloud first.
@@ -177,17 +189,28 @@ fn jobs(
     source: &dyn PointSource,
     path: &Path,
     options: &CloudOptions<'_>,
-    classes: &BTreeMap<ClassId, ClassPoints>,
+    survey: &Survey,
 ) -> Result<Vec<Job>> {
+    let format = CloudFormat::of(path);
     let job = |path: PathBuf, points: u64, class: Option<ClassId>, label_colors: bool| {
-        let layout = ply_layout(source.layout(), options, label_colors, classes)?;
-        Ok(Job { file: WrittenCloud { path, points, class, label_colors }, layout })
+        let columns = match format {
+            CloudFormat::Ply => {
+                Columns::Ply(ply_layout(source.layout(), options, label_colors, &survey.classes)?)
+            }
+            _ => {
+                let colors = source.layout().colors || label_colors;
+                let has = CloudLayout { colors, ..source.layout() };
+                Columns::Las(LasColumns::new(&path, has, options, class, survey)?)
+            }
+        };
+        Ok(Job { file: WrittenCloud { path, points, class, label_colors }, columns })
     };
     let mut jobs = vec![job(path.to_owned(), source.len(), None, false)?];
     if options.color_by_label {
         jobs.push(job(label_colors_path(path), source.len(), None, true)?);
     }
     if options.split_by_class {
+        let classes = &survey.classes;
         let ids: Vec<ClassId> = classes.keys().copied().collect();
         for (path, (&id, class)) in class_paths(path, options.needed_table()?, &ids).into_iter().zip(classes)
         {
@@ -197,120 +220,12 @@ fn jobs(
     Ok(jobs)
 }
 
-/// The columns and comments of a file of points that have `has`.
-fn ply_layout(
-    has: CloudLayout,
-    options: &CloudOptions<'_>,
-    label_colors: bool,
-    classes: &BTreeMap<ClassId, ClassPoints>,
-) -> Result<ply::Layout> {
-    let colors = has.colors || label_colors;
-    let mut layout = match options.layout {
-        PlyLayout::Plain => ply::Layout::plain(colors, has.normals),
-        PlyLayout::OpenMvsProject => {
-            let plain = ply::Layout::plain(colors, has.normals);
-            ply::Layout { type_names: ply::TypeNames::Sized, ..plain }
-        }
-        PlyLayout::Odm if has.views && colors && has.normals => return Ok(ply::Layout::odm()),
-        PlyLayout::Odm => {
-            return Err(Error::invalid("--ply-layout odm needs colours, normals and views; use plain"));
-        }
-        PlyLayout::OpenMvs if has.views => ply::Layout::openmvs(colors, has.normals, has.weights),
-        PlyLayout::OpenMvs => {
-            return Err(Error::invalid("these points have no views for --ply-layout openmvs; use plain"));
-        }
-    };
-    if has.confidence {
-        layout.fields.push(ply::Field::Confidence);
-    }
-    if has.labels {
-        let table = options.table.ok_or_else(|| Error::invalid("labelled points without a class table"))?;
-        let listed = table.classes().iter().map(|class| class.id);
-        let wide = listed.chain(classes.keys().copied()).any(|id| id.0 > u16::from(u8::MAX));
-        layout = layout.with_label(wide, true).with_comments(table.classes().iter().map(|class| {
-            let [r, g, b] = table.color(class.id);
-            // One word per name, so that every comment has the same number of words.
-            let name = class.name.split_whitespace().collect::<Vec<_>>().join("_");
-            format!("class {} {name} {r} {g} {b}", class.id)
-        }));
-    }
-    Ok(layout)
-}
-
 /// Writes some files in one pass over the points; they take their names when all are complete.
-fn write_pass(source: &dyn PointSource, jobs: &[Job], table: Option<&ClassTable>) -> Result<()> {
-    let mut outputs = jobs.iter().map(Output::create).collect::<Result<Vec<_>>>()?;
-    source.for_each(&mut |point| {
-        for output in &mut outputs {
-            output.take(point, table)?;
-        }
-        Ok(())
-    })?;
+fn write_pass(source: &dyn PointSource, jobs: &[Job], options: &CloudOptions<'_>) -> Result<()> {
+    let mut outputs = jobs.iter().map(|job| Output::create(job, options)).collect::<Result<Vec<_>>>()?;
+    source.for_each(&mut |point| outputs.iter_mut().try_for_each(|output| output.take(point)))?;
     let complete = outputs.into_iter().map(Output::finish).collect::<Result<Vec<_>>>()?;
     complete.into_iter().try_for_each(AtomicFile::commit)
-}
-
-/// A file being written.
-struct Output<'a> {
-    job: &'a Job,
-    writer: PlyWriter<AtomicFile>,
-    chunk: Cloud,
-}
-
-impl<'a> Output<'a> {
-    fn create(job: &'a Job) -> Result<Self> {
-        let file = AtomicFile::create(&job.file.path)?;
-        let writer = PlyWriter::new(file, &job.layout, job.file.points)
-            .map_err(|e| Error::writing(&job.file.path, e))?;
-        Ok(Output { job, writer, chunk: Cloud::default() })
-    }
-
-    /// Appends a point if it belongs in this file.
-    fn take(&mut self, point: &CloudPoint<'_>, table: Option<&ClassTable>) -> Result<()> {
-        let file = &self.job.file;
-        if file.class.is_some_and(|class| class.0 != point.label) {
-            return Ok(());
-        }
-        let color = match table {
-            Some(table) if file.label_colors => table.color(ClassId(point.label)),
-            _ => point.color,
-        };
-        let chunk = &mut self.chunk;
-        for field in &self.job.layout.fields {
-            match field {
-                ply::Field::Position | ply::Field::PositionF64 => chunk.positions.push(point.position),
-                ply::Field::Color => chunk.colors.push(color),
-                ply::Field::Normal => chunk.normals.push(point.normal),
-                ply::Field::LabelU8 | ply::Field::LabelU16 => chunk.labels.push(point.label),
-                ply::Field::LabelConfidence => chunk.label_confidence.push(point.label_confidence),
-                ply::Field::Confidence => chunk.confidence.push(point.confidence),
-                ply::Field::ViewIndices => {
-                    let views = &mut chunk.views;
-                    if views.offsets.is_empty() {
-                        views.offsets.push(0);
-                    }
-                    views.images.extend(point.views.iter().map(|view| view.0));
-                    views.offsets.push(views.images.len() as u64);
-                }
-                ply::Field::ViewWeights => chunk.views.weights.extend_from_slice(point.weights),
-                ply::Field::ViewCount => chunk.view_counts.push(point.views.len() as u32),
-                ply::Field::Value => chunk.value.push(0.0),
-            }
-        }
-        if chunk.positions.len() >= POINTS_PER_CHUNK { self.flush() } else { Ok(()) }
-    }
-
-    fn flush(&mut self) -> Result<()> {
-        self.writer.write(&self.chunk).map_err(|e| Error::writing(&self.job.file.path, e))?;
-        self.chunk.clear();
-        Ok(())
-    }
-
-    /// The complete file, not yet under its name.
-    fn finish(mut self) -> Result<AtomicFile> {
-        self.flush()?;
-        self.writer.finish().map_err(|e| Error::writing(&self.job.file.path, e))
-    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,47 @@ use std::collections::HashSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+/// What kind of file a cloud is written as; the extension of its name says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CloudFormat {
+    /// `.ply`
+    Ply,
+    /// `.las`
+    Las,
+    /// `.laz`, compressed LAS
+    Laz,
+}
+
+impl CloudFormat {
+    /// The format of the file at `path` by its extension, in any case; `None` for another extension or none.
+    pub fn named(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "ply" => Some(CloudFormat::Ply),
+            "las" => Some(CloudFormat::Las),
+            "laz" => Some(CloudFormat::Laz),
+            _ => None,
+        }
+    }
+
+    /// The format of the file at `path`; PLY whatever else its name says.
+    pub fn of(path: &Path) -> Self {
+        CloudFormat::named(path).unwrap_or(CloudFormat::Ply)
+    }
+
+    /// Whether coordinates have more digits than single precision holds.
+    pub fn is_precise(self) -> bool {
+        self != CloudFormat::Ply
+    }
+}
+
+/// `dir/x.legend.png` for the picture that says what the class colours of `dir/x.ply` mean.
+pub(super) fn legend_path(cloud: &Path) -> PathBuf {
+    let mut name = stem(cloud);
+    name.push(".legend.png");
+    cloud.with_file_name(name)
+}
+
 /// `dir/x.ply` for the cloud in the colours of its classes: `dir/x.labels.ply`.
 pub(super) fn label_colors_path(cloud: &Path) -> PathBuf {
     with_part(cloud, LABELS)
@@ -40,11 +81,24 @@ fn file_part(class_name: &str) -> String {
 
 /// `x.ply` with `.part` before its extension.
 fn with_part(cloud: &Path, part: &str) -> PathBuf {
-    let is_ply = cloud.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
-    let stem = if is_ply { cloud.file_stem() } else { cloud.file_name() };
-    let mut name = OsString::from(stem.unwrap_or_default());
-    name.push(format!(".{part}.ply"));
+    let extension = match CloudFormat::named(cloud) {
+        Some(_) => cloud.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default(),
+        None => "ply".to_owned(),
+    };
+    // Capitals are not carried on.
+    let extension = extension.to_ascii_lowercase();
+    let mut name = stem(cloud);
+    name.push(format!(".{part}.{extension}"));
     cloud.with_file_name(name)
+}
+
+/// The file name of a cloud without its extension, if it has one of a cloud.
+pub(super) fn stem(cloud: &Path) -> OsString {
+    let stem = match CloudFormat::named(cloud) {
+        Some(_) => cloud.file_stem(),
+        None => cloud.file_name(),
+    };
+    stem.unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]
@@ -57,6 +111,8 @@ mod tests {
         assert_eq!(labels("out/x.ply"), Path::new("out/x.labels.ply"));
         assert_eq!(labels("x.v2.PLY"), Path::new("x.v2.labels.ply"));
         assert_eq!(labels("out/x.v2"), Path::new("out/x.v2.labels.ply"));
+        assert_eq!(labels("out/x.LAZ"), Path::new("out/x.labels.laz"));
+        assert_eq!(legend_path(Path::new("out/x.las")), Path::new("out/x.legend.png"));
     }
 
     #[test]

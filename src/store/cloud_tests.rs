@@ -1,7 +1,9 @@
 use super::*;
 use crate::progress::{Event, Listener, Stage};
-use crate::scene::{PointCloud, PointSink, ViewIndex};
+use crate::scene::{CloudPoint, PointCloud, PointSink, ViewIndex};
+use crate::store::cloud_output::POINTS_PER_CHUNK;
 use semvs_formats::Limits;
+use semvs_formats::ply::{self, Cloud};
 use std::sync::{Arc, Mutex};
 
 const ALL: CloudLayout =
@@ -89,7 +91,8 @@ fn labels_stand_between_normals_and_views_with_a_comment_per_class() {
     assert_eq!(points.normals[6], [0.0, 1.0, 6.0]);
     let classes: Vec<_> = written.classes.iter().map(|(id, c)| (id.0, c.points, c.confidence_sum)).collect();
     assert_eq!(classes, [(0, 3, 0.0), (1, 2, 1.0), (4, 2, 2.0)]);
-    assert_eq!(names(folder.path()), ["x.ply"]);
+    assert_eq!(names(folder.path()), ["x.legend.png", "x.ply"]);
+    assert_eq!(written.legend, Some(folder.path().join("x.legend.png")));
 }
 
 #[test]
@@ -121,7 +124,7 @@ fn the_parts_hold_exactly_the_points_of_the_whole() {
     // More points than one chunk holds.
     let n = 3 * POINTS_PER_CHUNK as u32 + 5;
     let written = write_clouds(&cloud(n, ALL), &path, &options, &Progress::silent()).unwrap();
-    let expected = ["x.building.ply", "x.labels.ply", "x.ply", "x.void.ply", "x.window.ply"];
+    let expected = ["x.building.ply", "x.labels.ply", "x.legend.png", "x.ply", "x.void.ply", "x.window.ply"];
     assert_eq!(names(folder.path()), expected);
     let whole = read(&path);
     assert_eq!(whole.len() as u32, n);
@@ -173,7 +176,7 @@ fn many_classes_are_written_in_several_passes() {
             .unwrap();
     }
     write_clouds(&points, &path, &options, &Progress::silent()).unwrap();
-    assert_eq!(names(folder.path()).len(), 41);
+    assert_eq!(names(folder.path()).len(), 42);
     assert_eq!(read(&folder.path().join("x.class-40.ply")).positions, [[39.0; 3], [79.0; 3]]);
 }
 
@@ -286,4 +289,140 @@ fn places_that_cannot_be_written_show_before_the_work() {
     check_cloud_paths(&path, &options, Some(&policy)).unwrap();
     std::fs::create_dir(folder.path().join("x.labels.ply")).unwrap();
     assert!(check_cloud_paths(&path, &options, Some(&policy)).is_err());
+}
+
+/// The points of a LAS or LAZ file.
+fn las_points(path: &Path) -> Vec<las::Point> {
+    let data = las::Reader::from_path(path).unwrap().read_all().unwrap();
+    data.points().map(|point| point.unwrap()).collect()
+}
+
+#[test]
+fn las_and_laz_hold_what_the_ply_holds_where_it_belongs() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = facade();
+    let n = 2 * POINTS_PER_CHUNK as u32 + 5;
+    let source = cloud(n, CloudLayout { confidence: true, ..ALL });
+    let placement = Placement::shift([500_000.0, 5_200_000.25, 0.0]);
+    let options = CloudOptions {
+        table: Some(&table),
+        split_by_class: true,
+        color_by_label: true,
+        placement,
+        ..CloudOptions::default()
+    };
+    for extension in ["las", "laz"] {
+        let path = folder.path().join(format!("x.{extension}"));
+        let written = write_clouds(&source, &path, &options, &Progress::silent()).unwrap();
+        let of = |part: &str| las_points(&folder.path().join(format!("x.{part}{extension}")));
+        let whole = of("");
+        assert_eq!(whole.len() as u32, n);
+        for (found, point) in whole.iter().zip(source.iter()) {
+            let place = placement.place(point.position);
+            for (a, b) in [found.x, found.y, found.z].into_iter().zip(place) {
+                assert!((a - b).abs() <= 0.000_5, "{a} {b}");
+            }
+            assert_eq!(
+                u8::from(found.classification),
+                [1, 6, 68][usize::from(point.label != 0) + usize::from(point.label == 4)]
+            );
+            assert_eq!(found.extra_bytes.len(), 12 + 2 + 4 + 4 + 2);
+            assert_eq!(found.extra_bytes[12..14], point.label.to_le_bytes());
+        }
+        assert_eq!(of("labels.")[4].color.unwrap().blue, 255 << 8);
+        let parts: usize = ["void.", "building.", "window."].iter().map(|part| of(part).len()).sum();
+        assert_eq!(parts as u32, n);
+        let places = |points: &[las::Point]| points.iter().map(|p| (p.x, p.y, p.z)).collect::<Vec<_>>();
+        let windows: Vec<las::Point> =
+            whole.iter().filter(|p| u8::from(p.classification) == 68).cloned().collect();
+        assert_eq!(places(&of("window.")), places(&windows), "on the grid of the whole");
+        assert_eq!(written.files.len(), 5);
+    }
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(bytes("x.laz").len() < bytes("x.las").len());
+    let before = bytes("x.laz");
+    write_clouds(&source, &folder.path().join("x.laz"), &options, &Progress::silent()).unwrap();
+    assert_eq!(before, bytes("x.laz"));
+}
+
+#[test]
+fn las_without_labels_colours_and_normals_is_bare() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.las");
+    let bare = CloudLayout { normals: true, ..CloudLayout::default() };
+    let options = CloudOptions { las_without_normals: true, ..CloudOptions::default() };
+    write_clouds(&cloud(3, bare), &path, &options, &Progress::silent()).unwrap();
+    let points = las_points(&path);
+    assert!(points.iter().all(|p| p.extra_bytes.is_empty() && p.color.is_none()));
+    assert!(points.iter().all(|p| u8::from(p.classification) == 0));
+    assert_eq!(names(folder.path()), ["x.las"]);
+}
+
+#[test]
+fn classes_that_have_no_las_code_show_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "name = \"t\"\nclass = [{ id = 192, name = \"a\" }, { id = 200, name = \"b\", las = 2 }]";
+    let table = ClassTable::from_toml(text, Path::new("t.toml")).unwrap();
+    let options = CloudOptions { table: Some(&table), ..CloudOptions::default() };
+    let check = |name: &str, policy: Option<&ClassPolicy>| {
+        check_cloud_paths(&folder.path().join(name), &options, policy).map_err(|e| e.to_string())
+    };
+    let error = check("x.laz", None).unwrap_err();
+    assert!(error.starts_with("class 192 \"a\" of class table t has no LAS code"), "{error}");
+    assert_eq!(check("x.ply", None), Ok(()));
+    let rules = crate::semantics::ClassRules { exclude: vec!["a".into()], ..Default::default() };
+    let policy = ClassPolicy::new(&table, &rules).unwrap();
+    assert_eq!(check("x.las", Some(&policy)), Ok(()));
+    let mut points = PointCloud::new(CloudLayout { labels: true, ..CloudLayout::default() });
+    points.push(&CloudPoint { label: 192, ..CloudPoint::default() }).unwrap();
+    let written = write_clouds(&points, &folder.path().join("x.las"), &options, &Progress::silent());
+    assert!(written.unwrap_err().to_string().contains("class 192"));
+}
+
+#[test]
+fn coordinates_that_are_no_numbers_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut points = PointCloud::new(CloudLayout::default());
+    points.push(&CloudPoint::default()).unwrap();
+    points.push(&CloudPoint { position: [0.0, f32::NAN, 0.0], ..CloudPoint::default() }).unwrap();
+    let path = folder.path().join("x.las");
+    let error = write_clouds(&points, &path, &CloudOptions::default(), &Progress::silent()).unwrap_err();
+    assert!(error.to_string().starts_with("point 1 has a coordinate that is no number"), "{error}");
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn doubles_keep_the_digits_of_large_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.ply");
+    let layout = CloudLayout { labels: false, ..ALL };
+    let placement = Placement::shift([500_000.0, 5_200_000.25, 0.0]);
+    let options =
+        CloudOptions { doubles: true, placement, layout: PlyLayout::OpenMvs, ..CloudOptions::default() };
+    write_clouds(&cloud(3, layout), &path, &options, &Progress::silent()).unwrap();
+    let points = read(&path);
+    assert_eq!(points.positions_f64[2], [500_002.0, 5_200_000.75, -1.0]);
+    assert_eq!(points.images_of(1), [1, 4]);
+    let odm = CloudOptions { layout: PlyLayout::Odm, doubles: true, ..CloudOptions::default() };
+    let error = write_clouds(&cloud(3, layout), &path, &odm, &Progress::silent()).unwrap_err().to_string();
+    assert!(error.contains("--ply-doubles"), "{error}");
+}
+
+#[test]
+fn class_clouds_of_an_earlier_run_are_named() {
+    for extension in ["ply", "las", "laz"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("x.{extension}"));
+        let table = facade();
+        let split = CloudOptions { table: Some(&table), split_by_class: true, ..CloudOptions::default() };
+        write_clouds(&cloud(9, ALL), &path, &split, &Progress::silent()).unwrap();
+        let warnings = Arc::new(Warnings::default());
+        let mut points = PointCloud::new(CloudLayout { labels: true, ..CloudLayout::default() });
+        points.push(&CloudPoint { label: 1, ..CloudPoint::default() }).unwrap();
+        write_clouds(&points, &path, &split, &Progress::new(warnings.clone())).unwrap();
+        let lines = warnings.0.lock().unwrap();
+        let [line] = lines.as_slice() else { panic!("{lines:?}") };
+        let named = |part: &str| line.contains(&format!("x.{part}.{extension}"));
+        assert!(named("void") && named("window") && !named("building"), "{line}");
+    }
 }

@@ -6,6 +6,7 @@ mod common;
 
 mod actions;
 mod bad_input;
+mod cloud_files;
 mod colmap;
 mod command_line;
 mod compare;

@@ -1,7 +1,7 @@
 //! Depth maps to clouds without fusion, on the bundled scene.
 
 use crate::common::{self, Scratch, facade6};
-use semvs::pipeline::{ConvertJob, LabelJob, Outputs, SceneArchive, convert};
+use semvs::pipeline::{ConvertJob, LabelJob, Outputs, convert};
 use semvs::progress::Progress;
 use semvs::semantics::ClassRules;
 use semvs::store::cloud::PlyLayout;
@@ -27,18 +27,7 @@ fn labels(folder: &Path, classes: &[&str]) -> LabelJob {
 
 /// A job that writes `x.ply` in `folder`.
 fn job(depth_maps: Vec<PathBuf>, labels: Option<LabelJob>, cloud: &Path) -> ConvertJob {
-    let outputs = Outputs {
-        cloud: cloud.to_owned(),
-        scene: None,
-        archive: SceneArchive::Interface,
-        layout: PlyLayout::Plain,
-        split_by_class: false,
-        color_by_label: false,
-        report: None,
-        names_from_scene: true,
-        sparse_cloud: false,
-        allow_empty: false,
-    };
+    let outputs = Outputs::of(cloud.to_owned());
     ConvertJob { depth_maps, working_folder: Some(facade6()), labels, outputs }
 }
 

@@ -4,8 +4,9 @@ use super::cloud_path;
 use crate::cli::resolve;
 use crate::cli::semvs_args::ConvertArgs;
 use crate::error::{Error, Result};
-use crate::pipeline::{self, ConvertJob, Outputs, SceneArchive};
+use crate::pipeline::{self, ConvertJob};
 use crate::progress::Progress;
+use crate::store::cloud::PlyLayout;
 use std::path::Path;
 
 /// Runs the command.
@@ -24,18 +25,7 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
         depth_maps: args.depth_maps.clone(),
         working_folder: args.working_folder.clone(),
         labels: resolve::labels(&args.labels, &as_typed)?,
-        outputs: Outputs {
-            cloud: cloud_path(&args.output)?,
-            scene: None,
-            archive: SceneArchive::Interface,
-            layout: resolve::typed_layout(args.ply_layout),
-            split_by_class: args.split_by_class,
-            color_by_label: args.color_by_label,
-            report: None,
-            names_from_scene: true,
-            sparse_cloud: false,
-            allow_empty: false,
-        },
+        outputs: resolve::outputs(&args.clouds, cloud_path(&args.output)?, PlyLayout::Plain),
     };
     crate::cli::print(&pipeline::convert(&job, progress)?.summary());
     Ok(())

@@ -25,10 +25,10 @@ use super::listen::Recorder;
 use super::options::SharedOptions;
 use super::resolve::{self, Resolver};
 use crate::error::{Error, Result};
-use crate::pipeline::{DEPTH_MAP, Outputs, SceneArchive};
+use crate::pipeline::{DEPTH_MAP, Outputs};
 use crate::report::{OutputReport, RunReport};
 use crate::store::atomic::write_file;
-use crate::store::cloud::PlyLayout;
+use crate::store::cloud::{CloudFormat, PlyLayout};
 use crate::store::colmap::Workspace;
 use crate::store::paths::with_suffix;
 use clap::ArgMatches;
@@ -53,8 +53,10 @@ fn cloud_path(typed: &Path) -> Result<PathBuf> {
             Err(Error::content(typed, "--output: this is a device or a pipe; give the name of a file"))
         }
         None => Ok(typed.with_extension("ply")),
-        Some(extension) if extension.eq_ignore_ascii_case("ply") => Ok(typed.to_owned()),
-        Some(_) => Err(Error::content(typed, "--output: clouds are written as .ply; end the name so")),
+        Some(_) if CloudFormat::named(typed).is_some() => Ok(typed.to_owned()),
+        Some(_) => {
+            Err(Error::content(typed, "--output: clouds are written as .ply, .las or .laz; end the name so"))
+        }
     }
 }
 
@@ -118,16 +120,9 @@ fn resolver<'a>(options: &'a SharedOptions, recorder: &Arc<Recorder>) -> Result<
 /// What to write for the options about labelled outputs.
 fn outputs(typed: &LabelOutput, cloud: PathBuf, scene: Option<PathBuf>) -> Outputs {
     Outputs {
-        cloud,
         scene,
-        archive: SceneArchive::Interface,
-        layout: resolve::layout(typed, PlyLayout::Plain),
-        split_by_class: typed.split_by_class,
-        color_by_label: typed.color_by_label,
         report: typed.report.clone(),
-        names_from_scene: true,
-        sparse_cloud: false,
-        allow_empty: false,
+        ..resolve::outputs(&typed.clouds, cloud, PlyLayout::Plain)
     }
 }
 
@@ -179,10 +174,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clouds_end_in_ply() {
+    fn clouds_end_in_ply_las_or_laz() {
         assert_eq!(cloud_path(Path::new("a/b")).unwrap(), Path::new("a/b.ply"));
         assert_eq!(cloud_path(Path::new("b.PLY")).unwrap(), Path::new("b.PLY"));
-        assert!(cloud_path(Path::new("b.las")).unwrap_err().to_string().contains(".ply"));
+        assert_eq!(cloud_path(Path::new("b.las")).unwrap(), Path::new("b.las"));
+        assert!(cloud_path(Path::new("b.xyz")).unwrap_err().to_string().contains(".ply, .las or .laz"));
         assert_eq!(default_cloud(Path::new("x/scene.mvs")), Path::new("x/scene_dense.ply"));
     }
 }

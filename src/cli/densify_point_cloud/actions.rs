@@ -77,7 +77,15 @@ fn cloud_job(typing: &Typing, job: &DensifyJob, input: SceneJob, work: CloudWork
     };
     let base = with_suffix(&job.outputs.cloud.with_extension(""), suffix);
     let mut outputs = job.outputs.clone();
-    outputs.cloud = with_suffix(&base, ".ply");
+    let extension = match work {
+        CloudWork::Scale(_) => "ply".into(),
+        _ => job.outputs.cloud.extension().unwrap_or_default().to_owned(),
+    };
+    outputs.cloud = base.with_file_name(format!(
+        "{}.{}",
+        base.file_name().unwrap_or_default().to_string_lossy(),
+        extension.to_string_lossy()
+    ));
     if matches!(work, CloudWork::WellSeen(_)) && !typing.has("ply-layout") {
         outputs.layout = PlyLayout::OpenMvsProject;
     }

@@ -162,6 +162,7 @@ mod tests {
                     "missing-labels" | "unknown-label" => "void".into(),
                     "ply-layout" => "plain".into(),
                     "filter" => "unbiased".into(),
+                    "offset" => "1,-2,3".into(),
                     _ => "1".into(),
                 });
             }

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
 use crate::report::{RunReport, class_table};
 use crate::store::atomic::create_folder;
-use crate::store::cloud::PlyLayout;
+use crate::store::cloud::{CloudFormat, PlyLayout};
 use crate::store::paths::with_suffix;
 use semvs_formats::mvs::ArchiveKind;
 use std::ffi::OsString;
@@ -162,18 +162,25 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion()?,
         outputs: Outputs {
-            cloud: with_suffix(&base, ".ply"),
             scene: Some(with_suffix(&base, ".mvs")),
             archive,
-            layout: resolve::layout(outputs, layout),
-            split_by_class: outputs.split_by_class,
-            color_by_label: outputs.color_by_label,
             report: outputs.report.as_deref().map(|path| under(folder, &openmvs_path(path))),
             names_from_scene: false,
             sparse_cloud: true,
             allow_empty: strict,
+            ..resolve::outputs(&outputs.clouds, with_suffix(&base, cloud_extension(args)), layout)
         },
     })
+}
+
+/// The extension of the cloud: `.ply`, unless the results are named like a LAS or LAZ file.
+fn cloud_extension(args: &DropInArgs) -> &'static str {
+    let named = args.output_file.as_deref().filter(|_| !args.strict_openmvs).and_then(CloudFormat::named);
+    match named {
+        Some(CloudFormat::Las) => ".las",
+        Some(CloudFormat::Laz) => ".laz",
+        Some(CloudFormat::Ply) | None => ".ply",
+    }
 }
 
 /// The results' path without extension.

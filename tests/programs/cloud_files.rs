@@ -1,0 +1,100 @@
+//! Clouds as LAS and LAZ, with doubles, in their place in the world.
+
+use crate::common::{FUSE_ONLY, Scratch};
+use semvs_formats::Limits;
+use semvs_formats::mvs;
+use std::path::Path;
+
+const LABELS: &str = "--label-path labels --class-table 3dom-facade";
+/// Half the step of a LAS file for a scene in metres, and what arithmetic adds.
+const HALF_STEP: f64 = 0.5001e-4;
+
+fn las_points(path: &Path) -> Vec<las::Point> {
+    let data = las::Reader::from_path(path).unwrap().read_all().unwrap();
+    data.points().map(|point| point.unwrap()).collect()
+}
+
+/// Positions of a LAS file against those of a PLY file plus `offset`.
+#[track_caller]
+fn same_places(las: &[las::Point], ply: &[[f32; 3]], offset: [f64; 3]) {
+    assert_eq!(las.len(), ply.len());
+    for (a, b) in las.iter().zip(ply) {
+        for ((a, b), offset) in [a.x, a.y, a.z].into_iter().zip(b).zip(offset) {
+            assert!((a - f64::from(*b) - offset).abs() <= HALF_STEP, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn both_programs_write_laz_by_the_name() {
+    let scratch = Scratch::with_maps();
+    let out = scratch.densify_point_cloud(&format!("scene.mvs -o dense.laz {FUSE_ONLY} {LABELS}")).ok();
+    assert!(out.stdout.contains("dense.laz"), "{}", out.stdout);
+    assert!(scratch.has("dense.mvs") && scratch.has("dense.legend.png") && !scratch.has("dense.ply"));
+    scratch.densify_point_cloud(&format!("scene.mvs -o dense {FUSE_ONLY} {LABELS}")).ok();
+    let ply = scratch.cloud("dense.ply");
+    let laz = las_points(&scratch.path("dense.laz"));
+    same_places(&laz, &ply.positions, [0.0; 3]);
+    for (point, label) in laz.iter().zip(&ply.labels) {
+        let code = [1, 6, 66, 67, 68, 69][usize::from(*label)];
+        assert_eq!(u8::from(point.classification), code);
+        assert_eq!(point.extra_bytes[12..14], label.to_le_bytes());
+    }
+    scratch
+        .semvs(&format!(
+            "fuse scene.mvs --depth-maps . -o again.LAZ {LABELS} --split-by-class --color-by-label"
+        ))
+        .ok();
+    assert_eq!(las_points(&scratch.path("again.LAZ")).len(), laz.len());
+    assert!(scratch.has("again.building.laz") && scratch.has("again.labels.laz"));
+    let strict = format!("scene.mvs -o dense.laz --strict-openmvs {FUSE_ONLY}");
+    std::fs::remove_file(scratch.path("dense.laz")).unwrap();
+    scratch.densify_point_cloud(&strict).ok();
+    assert!(!scratch.has("dense.laz"), "as OpenMVS does");
+}
+
+#[test]
+fn an_offset_needs_digits_and_gets_them() {
+    let scratch = Scratch::with_maps();
+    let fuse = |words: &str| scratch.semvs(&format!("fuse scene.mvs --depth-maps . {words}"));
+    fuse("-o x.ply --offset 500000,5200000,0").fails_naming(&[
+        "--offset 500000,5200000,0",
+        "--ply-doubles",
+        ".laz",
+    ]);
+    fuse("-o x.ply").ok();
+    fuse("-o y.ply --offset 500000.5,-5200000,0 --ply-doubles").ok();
+    fuse("-o y.las --offset 500000.5,-5200000,0 --las-normals 0").ok();
+    let (x, y) = (scratch.cloud("x.ply"), scratch.cloud("y.ply"));
+    let moved = |p: &[f32; 3]| [f64::from(p[0]) + 500_000.5, f64::from(p[1]) - 5_200_000.0, f64::from(p[2])];
+    assert!(x.positions.iter().zip(&y.positions_f64).all(|(x, y)| moved(x) == *y));
+    let las = las_points(&scratch.path("y.las"));
+    same_places(&las, &x.positions, [500_000.5, -5_200_000.0, 0.0]);
+    assert_eq!(las[0].extra_bytes.len(), 2, "views alone");
+}
+
+#[test]
+fn the_scenes_transform_places_clouds_that_have_the_digits() {
+    let scratch = Scratch::with_maps();
+    let mut scene = mvs::read(scratch.path("scene.mvs"), &Limits::default()).unwrap();
+    (scene.transform[3], scene.transform[7]) = (-300_000.0, -4_000_000.0);
+    let mut bytes = Vec::new();
+    mvs::write_interface(&mut bytes, &scene, mvs::NEWEST_VERSION).unwrap();
+    scratch.write("scene.mvs", bytes);
+    let fuse = |words: &str| scratch.semvs(&format!("fuse scene.mvs --depth-maps . {words}"));
+    fuse("-o x.ply").ok();
+    let out = fuse("-o x.las").ok();
+    assert!(out.stderr.contains("(300000, 4000000, 0)"), "{}", out.stderr);
+    let ply = scratch.cloud("x.ply");
+    same_places(&las_points(&scratch.path("x.las")), &ply.positions, [300_000.0, 4_000_000.0, 0.0]);
+    fuse("-o x.las --offset 0,0,0").ok();
+    same_places(&las_points(&scratch.path("x.las")), &ply.positions, [0.0; 3]);
+}
+
+#[test]
+fn finished_clouds_are_written_as_las_too() {
+    let scratch = Scratch::with_maps();
+    scratch.densify_point_cloud(&format!("scene.mvs -o dense --archive-type 1 {FUSE_ONLY}")).ok();
+    scratch.densify_point_cloud("dense.mvs -o few.laz --export-number-views 4").ok();
+    assert!(las_points(&scratch.path("few_4views.laz")).len() > 100);
+}
