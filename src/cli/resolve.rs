@@ -213,7 +213,11 @@ fn tower(mode: i32, cloud: PathBuf) -> Result<Option<TowerJob>> {
     Ok(Some(TowerJob { work, unchecked: mode < 0, any_direction: false, cloud }))
 }
 
-fn masks(ignore: i32, folder: Option<PathBuf>) -> Result<Option<MaskJob>> {
+/// The masks that the options ask for.
+///
+/// # Errors
+/// A value that no mask has.
+pub(crate) fn masks(ignore: i32, folder: Option<PathBuf>) -> Result<Option<MaskJob>> {
     if ignore < 0 {
         return Ok(None);
     }

@@ -166,6 +166,12 @@ pub(crate) struct ConvertArgs {
     /// then the current folder]
     #[arg(short = 'w', long, value_name = "DIR")]
     pub(crate) working_folder: Option<PathBuf>,
+    /// Pixels with this value in an image's mask become no points; negative = no masks
+    #[arg(long, value_name = "VALUE", default_value_t = -1, allow_negative_numbers = true)]
+    pub(crate) ignore_mask_label: i32,
+    /// Folder of masks named like the images: DSC1.jpg -> DSC1.mask.png
+    #[arg(long, value_name = "DIR")]
+    pub(crate) mask_path: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) labels: LabelInput,
     #[command(flatten)]

@@ -1,7 +1,8 @@
 //! Depth maps to a cloud without fusion.
 
-use super::inputs::Classes;
-use super::job::{LabelJob, Outputs};
+use super::inputs::{Classes, check_mask_folder};
+use super::job::{LabelJob, MaskJob, Outputs};
+use super::masks::{MaskRequest, Masks};
 use super::outputs::{check_places, cloud_rows, write_cloud};
 use super::skip::Labels;
 use crate::error::{Error, Result};
@@ -9,10 +10,11 @@ use crate::fusion::{FusionMaps, project_maps};
 use crate::geometry::{Placement, Size};
 use crate::progress::Progress;
 use crate::report::{OutputReport, RunReport};
-use crate::scene::{CloudLayout, DepthEstimate, PointSource, ResolutionOptions, ViewIndex};
+use crate::scene::{CloudLayout, PointSource, ResolutionOptions, ViewIndex};
 use crate::store::depth_store::{read_depth_header, read_depth_map};
 use crate::store::images::{image_size, load_working_color};
 use crate::store::labels::LabelRequest;
+use crate::store::masks::default_mask_name;
 use crate::store::paths::SearchPath;
 use crate::store::spool::{DEFAULT_SPOOL_MEMORY, PointSpool};
 use semvs_formats::Limits;
@@ -27,6 +29,8 @@ pub struct ConvertJob {
     pub depth_maps: Vec<PathBuf>,
     /// First place of the images that the depth maps name; the second is each depth map's folder.
     pub working_folder: Option<PathBuf>,
+    /// Masks, if they are used.
+    pub masks: Option<MaskJob>,
     /// Labels, if they are used.
     pub labels: Option<LabelJob>,
     /// What to write.
@@ -46,6 +50,8 @@ pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
     let maps = job.depth_maps.iter().map(|path| Source::new(path, job)).collect::<Result<Vec<Source>>>()?;
     let labels = job.labels.as_ref().map(|labels| open_labels(labels, &maps, progress)).transpose()?;
     check_places(&job.outputs, labels.as_ref().map(Labels::classes))?;
+    let masks =
+        job.masks.as_ref().map(|masks| open_masks(masks, &maps, labels.as_ref(), progress)).transpose()?;
     for map in maps.iter().filter(|map| map.color.is_none()) {
         let image = map.image.display();
         progress.warn(format!("{image}: no such image; the cloud gets no colours"));
@@ -61,7 +67,7 @@ pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
     let mut spool = PointSpool::new(layout, None, job.outputs.folder(), DEFAULT_SPOOL_MEMORY);
     for (i, map) in maps.iter().enumerate() {
         let view = ViewIndex(i as u32);
-        let loaded = map.load(view, layout.colors, labels.as_ref())?;
+        let loaded = map.load(view, layout.colors, labels.as_ref(), masks.as_ref())?;
         let policy = labels.as_ref().map(Labels::policy);
         let points = project_maps(view, &loaded, policy, layout, &mut spool)?;
         progress.detail(format!("{}: {points} points", map.path.display()));
@@ -112,10 +118,19 @@ impl Source {
         Ok(Source { path: path.to_owned(), image, mask: None, color, normals, confidence })
     }
 
-    fn load(&self, view: ViewIndex, colors: bool, labels: Option<&Labels>) -> Result<FusionMaps> {
-        let estimate: DepthEstimate = read_depth_map(&self.path, Limits::default())?;
+    fn load(
+        &self,
+        view: ViewIndex,
+        colors: bool,
+        labels: Option<&Labels>,
+        masks: Option<&Masks>,
+    ) -> Result<FusionMaps> {
+        let mut estimate = Arc::new(read_depth_map(&self.path, Limits::default())?);
+        if let Some(masks) = masks {
+            estimate = masks.unmasked(view, estimate)?;
+        }
         let size = estimate.depth.size();
-        let mut maps = FusionMaps::new(Arc::new(estimate));
+        let mut maps = FusionMaps::new(estimate);
         if colors {
             let at = ResolutionOptions { level: 0, max: size.longest(), ..ResolutionOptions::default() };
             let image = load_working_color(&self.image, &at)?;
@@ -144,4 +159,17 @@ fn open_labels(job: &LabelJob, maps: &[Source], progress: &Progress) -> Result<L
         })
         .collect();
     Labels::open_requests(job, &requests, progress)
+}
+
+fn open_masks(job: &MaskJob, maps: &[Source], labels: Option<&Labels>, progress: &Progress) -> Result<Masks> {
+    check_mask_folder(job)?;
+    let request = |map: &Source| {
+        let mask = PathBuf::from(default_mask_name(&map.image.to_string_lossy()));
+        Some(MaskRequest {
+            image_name: map.image.to_string_lossy().into_owned(),
+            image: map.image.clone(),
+            mask,
+        })
+    };
+    Masks::open(job, &maps.iter().map(request).collect::<Vec<_>>(), labels, progress)
 }

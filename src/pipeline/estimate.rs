@@ -113,7 +113,7 @@ impl Estimation<'_> {
         let steps = self.progress.start(Stage::Estimate, todo.len());
         for_each_view(todo, |view| {
             let start = Instant::now();
-            let problem = stereo_problem(self.prepared, view, self.progress)?;
+            let problem = stereo_problem(self.prepared, view)?;
             let mut estimate = stereo::estimate(&problem, self.options, self.cpu)?;
             self.clean(&mut estimate, last);
             self.store.write(&estimate)?;
@@ -135,7 +135,7 @@ impl Estimation<'_> {
         let steps = self.progress.start(Stage::Geometric { pass, passes }, todo.len());
         replace_all(self.store, &ids, || {
             for_each_view(todo, |view| {
-                let problem = stereo_problem(self.prepared, view, self.progress)?;
+                let problem = stereo_problem(self.prepared, view)?;
                 let previous = self.store.read(problem.reference.id)?;
                 let sources = problem
                     .sources

@@ -77,7 +77,6 @@ pub(super) fn fuse_maps(
         store,
         colors: options.estimate_colors != AttributeSource::None,
         derive_normals,
-        progress,
     };
     let fusion_views = fusion_views(prepared, store, views, derive_normals)?;
     let policy = prepared.labels.as_ref().map(|labels| labels.policy());
@@ -136,12 +135,14 @@ struct FusionSource<'a> {
     colors: bool,
     /// Maps without normals get them from the shape of their depths.
     derive_normals: bool,
-    progress: &'a Progress,
 }
 
 impl MapSource for FusionSource<'_> {
     fn load(&self, view: ViewIndex) -> Result<FusionMaps> {
-        let mut estimate = self.unmasked(view, self.store.read(self.prepared.id(view))?);
+        let mut estimate = self.store.read(self.prepared.id(view))?;
+        if let Some(masks) = &self.prepared.masks {
+            estimate = masks.unmasked(view, estimate)?;
+        }
         if self.derive_normals && estimate.normal.is_none() {
             let normal = normals_from_depth(&estimate.depth, &estimate.camera);
             estimate = Arc::new(DepthEstimate { normal: Some(normal), ..DepthEstimate::clone(&estimate) });
@@ -156,25 +157,5 @@ impl MapSource for FusionSource<'_> {
             None => (None, None),
         };
         Ok(FusionMaps { estimate, color, labels, checked_labels })
-    }
-}
-
-impl FusionSource<'_> {
-    /// The estimate without the depths of masked pixels, which maps made elsewhere may have.
-    fn unmasked(&self, view: ViewIndex, estimate: Arc<DepthEstimate>) -> Arc<DepthEstimate> {
-        let masks = self.prepared.masks.as_ref();
-        let ignored = masks.and_then(|m| m.ignored(view, estimate.depth.size(), self.progress));
-        let Some(ignored) = ignored else { return estimate };
-        let covers = |(depth, ignored): (&f32, &bool)| *ignored && *depth > 0.0;
-        if !estimate.depth.data().iter().zip(ignored.data()).any(covers) {
-            return estimate;
-        }
-        let mut estimate = DepthEstimate::clone(&estimate);
-        for (depth, &ignored) in estimate.depth.data_mut().iter_mut().zip(ignored.data()) {
-            if ignored {
-                *depth = 0.0;
-            }
-        }
-        Arc::new(estimate)
     }
 }

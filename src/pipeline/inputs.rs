@@ -1,6 +1,6 @@
 //! What a job reads, and what of it can be checked before any work.
 
-use super::job::{LabelJob, SceneJob};
+use super::job::{LabelJob, MaskJob, SceneJob};
 use crate::error::{Error, Result};
 use crate::semantics::{ClassPolicy, ClassTable};
 use semvs_formats::Limits;
@@ -40,11 +40,19 @@ pub(super) fn check_inputs(job: &SceneJob) -> Result<Option<Classes>> {
     let scene = Some(&job.scene).filter(|scene| !scene.is_dir());
     let files = [scene, job.pointcloud_file.as_ref(), job.view_neighbors_file.as_ref()];
     files.into_iter().flatten().try_for_each(|path| check_file(path))?;
-    let folder = job.masks.as_ref().and_then(|masks| masks.folder.as_deref());
-    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        return Err(Error::content(folder, "no such folder of masks (--mask-path)"));
-    }
+    job.masks.as_ref().map_or(Ok(()), check_mask_folder)?;
     job.labels.as_ref().map(Classes::of).transpose()
+}
+
+/// Checks that the folder of masks is there, if one is named.
+///
+/// # Errors
+/// It is not.
+pub(super) fn check_mask_folder(job: &MaskJob) -> Result<()> {
+    match job.folder.as_deref().filter(|folder| !folder.is_dir()) {
+        Some(folder) => Err(Error::content(folder, "no such folder of masks (--mask-path)")),
+        None => Ok(()),
+    }
 }
 
 fn check_file(path: &Path) -> Result<()> {

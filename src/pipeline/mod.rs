@@ -19,6 +19,7 @@ mod import;
 mod inputs;
 pub mod inspect;
 mod job;
+mod masks;
 mod outputs;
 mod prepare;
 mod problem;

@@ -2,7 +2,8 @@
 
 use super::images::Images;
 use super::job::SceneJob;
-use super::skip::{Labels, Masks};
+use super::masks::Masks;
+use super::skip::Labels;
 use super::sparse::{override_from_file, replace_points};
 use super::tower::use_tower;
 use crate::depth_filter::MAX_NEIGHBORS;
@@ -112,8 +113,9 @@ pub(super) fn prepare(
 ) -> Result<Prepared> {
     let start = Instant::now();
     // What is an error if it is wrong goes before the long work.
-    let masks = job.masks.as_ref().map(|m| Masks::find(m, &loaded, &cameras, progress)).transpose()?;
     let labels = job.labels.as_ref().map(|l| Labels::open(l, &loaded, &cameras, progress)).transpose()?;
+    let masks = job.masks.as_ref();
+    let masks = masks.map(|m| Masks::find(m, &loaded, &cameras, labels.as_ref(), progress)).transpose()?;
     let images = Images::new(&loaded, pixels_in_hand(job, &cameras) * size_of::<f32>());
     let mut dropped = header_drops(&loaded, &cameras);
     if decode {

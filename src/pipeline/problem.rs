@@ -4,7 +4,6 @@ use super::prepare::Prepared;
 use super::skip::skipped;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
-use crate::progress::Progress;
 use crate::scene::{ImageId, Neighbor, SparseInit, SparsePoint, ViewIndex, resize_gray};
 use crate::stereo::{SourceImage, StereoProblem};
 use std::sync::Arc;
@@ -18,17 +17,13 @@ const MIN_SCALE_DIFFERENCE: f32 = 0.15;
 ///
 /// # Errors
 /// An image cannot be read.
-pub(super) fn stereo_problem(
-    prepared: &Prepared,
-    view: ViewIndex,
-    progress: &Progress,
-) -> Result<StereoProblem> {
+pub(super) fn stereo_problem(prepared: &Prepared, view: ViewIndex) -> Result<StereoProblem> {
     let camera = prepared.camera(view)?;
     let neighbors = prepared.neighbors[view.index()].matching();
     let sources =
         neighbors.iter().map(|n| source_image(prepared, n)).collect::<Result<Vec<SourceImage>>>()?;
     let (sparse, depth_range) = sparse_points(prepared, view, camera);
-    let skip = skipped(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref(), progress)?;
+    let skip = skipped(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref())?;
     Ok(StereoProblem {
         reference: SourceImage {
             gray: prepared.images.gray(view, camera.size())?,

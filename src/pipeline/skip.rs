@@ -1,7 +1,8 @@
-//! Pixels that get no depth: masked ones, and those of classes that are not estimated.
+//! The classes of pixels, be they from label maps or masks, and which of them get no depth.
 
-use super::job::{LabelJob, MaskJob};
-use crate::error::{Error, Result};
+use super::job::LabelJob;
+use super::masks::Masks;
+use crate::error::Result;
 use crate::geometry::{Camera, Size};
 use crate::progress::Progress;
 use crate::scene::{Grid, LabelMap, ViewIndex};
@@ -9,10 +10,8 @@ use crate::semantics::{ClassPolicy, ClassTable, void_borders};
 use crate::store::images::image_size;
 use crate::store::import::LoadedScene;
 use crate::store::labels::{LabelRequest, LabelStore};
-use crate::store::masks::{default_mask_name, load_mask, mask_in_folder};
-use crate::store::paths::name_relative_to;
-use semvs_formats::{Limits, mvs};
-use std::path::{Path, PathBuf};
+use semvs_formats::Limits;
+use std::path::Path;
 use std::sync::Arc;
 
 /// The label maps of a run and what they decide.
@@ -94,99 +93,45 @@ impl Labels {
     }
 }
 
-/// The masks of a run.
-#[derive(Debug)]
-pub(super) struct Masks {
-    ignore: u16,
-    /// Whether the files are those of a folder that was named.
-    in_folder: bool,
-    files: Vec<Option<PathBuf>>,
+/// The classes of a view's pixels, and what to do with each: all that stages before fusion need to know of labels and
+/// masks.
+#[derive(Clone, Debug)]
+pub(super) struct Regions<'a> {
+    /// Class ids; what is masked has a class of its own, which is neither estimated nor kept.
+    pub(super) map: Arc<LabelMap>,
+    /// What to do with them.
+    pub(super) policy: &'a ClassPolicy,
 }
 
-impl Masks {
-    /// Finds the masks of all views that have a camera. A view without one is used whole, with a warning, unless
-    /// a folder was named.
-    ///
-    /// # Errors
-    /// A mask is missing in the folder that was named.
-    pub(super) fn find(
-        job: &MaskJob,
-        loaded: &LoadedScene,
-        cameras: &[Option<Camera>],
-        progress: &Progress,
-    ) -> Result<Self> {
-        let mut files = Vec::with_capacity(cameras.len());
-        for (view, camera) in loaded.scene.views.iter().zip(cameras) {
-            if camera.is_none() {
-                files.push(None);
-                continue;
-            }
-            let file = match (&job.folder, &view.mask) {
-                (Some(folder), _) => mask_in_folder(folder, &view.name),
-                (None, Some(mask)) => loaded.search.find(mask),
-                (None, None) => loaded.search.find(&default_mask_name(&view.name)),
-            };
-            if !file.is_file() {
-                let what = format!("no such mask for image {}", view.name);
-                if job.folder.is_some() {
-                    return Err(Error::content(&file, format!("{what} (--mask-path)")));
-                }
-                progress.warn(format!("{}: {what}; the image is used whole", file.display()));
-                files.push(None);
-                continue;
-            }
-            files.push(Some(file));
-        }
-        Ok(Masks { ignore: job.ignore, in_folder: job.folder.is_some(), files })
-    }
-
-    /// Names the masks of a folder that was named in the scene to be written, relative to the working folder.
-    pub(super) fn enter(&self, archive: &mut mvs::Scene, working_folder: &Path) {
-        for (image, file) in archive.images.iter_mut().zip(&self.files).filter(|_| self.in_folder) {
-            if let Some(file) = file {
-                image.mask_name = name_relative_to(file, working_folder).into_bytes();
-            }
-        }
-    }
-
-    /// The pixels of a view to ignore at `size`; `None` if it has no mask or one that cannot be read, with a
-    /// warning.
-    pub(super) fn ignored(&self, view: ViewIndex, size: Size, progress: &Progress) -> Option<Grid<bool>> {
-        let file = self.files[view.index()].as_ref()?;
-        match load_mask(file, size) {
-            Ok(mask) => {
-                let ignored = mask.data().iter().map(|&value| value == self.ignore).collect();
-                Grid::from_vec(size, ignored)
-            }
-            Err(error) => {
-                progress.warn(format!("{error}; the image is used whole"));
-                None
-            }
-        }
-    }
+/// The regions of a view at `size`; `None` without labels and masks.
+///
+/// # Errors
+/// As [`Labels::maps`] and [`Masks::ignored`].
+pub(super) fn regions<'a>(
+    view: ViewIndex,
+    size: Size,
+    masks: Option<&'a Masks>,
+    labels: Option<&'a Labels>,
+) -> Result<Option<Regions<'a>>> {
+    let map = labels.map(|labels| labels.maps(view, size)).transpose()?.map(|(map, _)| map);
+    Ok(match (masks, labels, map) {
+        (Some(masks), _, map) => Some(Regions { map: masks.over(map, view, size)?, policy: masks.policy() }),
+        (None, Some(labels), Some(map)) => Some(Regions { map, policy: labels.policy() }),
+        _ => None,
+    })
 }
 
 /// The pixels of a view that get no depth; `None`: all do.
 ///
 /// # Errors
-/// As [`Labels::maps`].
+/// As [`regions`].
 pub(super) fn skipped(
     view: ViewIndex,
     size: Size,
     masks: Option<&Masks>,
     labels: Option<&Labels>,
-    progress: &Progress,
 ) -> Result<Option<Grid<bool>>> {
-    let mut skip = masks.and_then(|masks| masks.ignored(view, size, progress));
-    if let Some(labels) = labels {
-        let (map, _) = labels.maps(view, size)?;
-        let unwanted = |&id: &u16| !labels.policy().is_estimated(id);
-        if map.data().iter().any(unwanted) {
-            let skip = skip.get_or_insert_with(|| Grid::filled(size, false));
-            for (skip, id) in skip.data_mut().iter_mut().zip(map.data()) {
-                *skip |= unwanted(id);
-            }
-        }
-    }
-    Ok(skip)
+    let Some(Regions { map, policy }) = regions(view, size, masks, labels)? else { return Ok(None) };
+    let skip: Vec<bool> = map.data().iter().map(|&id| !policy.is_estimated(id)).collect();
+    Ok(Grid::from_vec(size, skip).filter(|skip| skip.data().contains(&true)))
 }

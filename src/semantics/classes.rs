@@ -183,6 +183,11 @@ impl ClassTable {
         }
     }
 
+    /// An id that no class has: the largest there is.
+    pub fn free_id(&self) -> ClassId {
+        (1..=u16::MAX).rev().map(ClassId).find(|&id| self.get(id).is_none()).unwrap_or_default()
+    }
+
     /// The ASPRS LAS classification code of a class: the table's, else 64 + id, the first of the codes that users may
     /// define; void is 1, unclassified. `None`: 64 + id is beyond 255.
     pub fn las_code(&self, id: ClassId) -> Option<u8> {
@@ -402,6 +407,13 @@ mod tests {
         assert_eq!(met.color(ClassId(300)), table.color(ClassId(300)));
         let facade = builtin("3dom-facade");
         assert_eq!(facade.with_ids([ClassId(9)]), facade);
+    }
+
+    #[test]
+    fn the_largest_unused_id_is_free() {
+        assert_eq!(builtin("3dom-facade").free_id(), ClassId(u16::MAX));
+        let met = builtin("ids").with_ids([ClassId(65_535), ClassId(65_533)]);
+        assert_eq!(met.free_id(), ClassId(65_534));
     }
 
     #[test]

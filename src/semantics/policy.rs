@@ -106,6 +106,16 @@ impl ClassPolicy {
         Ok(ClassPolicy { kept, estimated, others_kept, consistency: rules.consistency, border: rules.border })
     }
 
+    /// The same, but `id` is neither kept nor estimated.
+    pub fn dropping(mut self, id: ClassId) -> Self {
+        let i = usize::from(id.0);
+        for wanted in [&mut self.kept, &mut self.estimated] {
+            wanted.resize(wanted.len().max(i + 1), self.others_kept);
+            wanted[i] = false;
+        }
+        self
+    }
+
     /// Whether a pixel of this class may start a point.
     #[inline]
     pub fn is_candidate(&self, id: impl Into<ClassId>) -> bool {
@@ -218,6 +228,15 @@ mod tests {
         let policy = ClassPolicy::new(&table, &rules).unwrap();
         assert_eq!(kept(&policy, 0..=4), [2]);
         assert!(policy.is_estimated(2) && policy.is_estimated(3) && !policy.is_estimated(1));
+    }
+
+    #[test]
+    fn a_class_can_be_dropped_afterwards() {
+        let policy = ClassPolicy::default().dropping(ClassId(3));
+        assert_eq!(kept(&policy, 0..=5), [0, 1, 2, 4, 5]);
+        assert!(!policy.is_estimated(3) && policy.is_estimated(2) && policy.is_estimated(60_000));
+        let policy = super::tests::policy("3dom-facade", &["door"], &[]).unwrap().dropping(ClassId(9));
+        assert_eq!(kept(&policy, 0..=u16::MAX), [5]);
     }
 
     #[test]

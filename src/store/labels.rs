@@ -277,14 +277,18 @@ fn warn_of_shared(views: &[LabelRequest], files: &HashMap<ViewIndex, PathBuf>, p
     }
 }
 
-/// Whether a label map of `size` has its image's aspect ratio: the larger of the two, scaled to the smaller one's
-/// width or height, must fit it to a pixel.
+/// Whether two rasters show the same, pixel for pixel or scaled: the larger of the two, scaled to the smaller one's width
+/// or height, must fit it to a pixel.
+pub(crate) fn have_one_shape(a: Size, b: Size) -> bool {
+    let (small, large) = if a.area() <= b.area() { (a, b) } else { (b, a) };
+    let [sw, sh, lw, lh] = [small.width, small.height, large.width, large.height].map(f64::from);
+    (sh - lh * sw / lw).abs() <= 1.0 || (sw - lw * sh / lh).abs() <= 1.0
+}
+
+/// Refuses a label map of `size` that has not its image's shape.
 fn check_aspect(path: &Path, size: Size, request: &LabelRequest) -> Result<()> {
     let Some(image) = request.size else { return Ok(()) };
-    let (small, large) = if size.area() <= image.area() { (size, image) } else { (image, size) };
-    let [sw, sh, lw, lh] = [small.width, small.height, large.width, large.height].map(f64::from);
-    let fits = (sh - lh * sw / lw).abs() <= 1.0 || (sw - lw * sh / lh).abs() <= 1.0;
-    if fits {
+    if have_one_shape(size, image) {
         return Ok(());
     }
     let what = format!(

@@ -13,6 +13,7 @@ mod compare;
 mod corners;
 mod exact_runs;
 mod exchange;
+mod masks;
 mod pipelines;
 mod runs;
 mod strict_openmvs;

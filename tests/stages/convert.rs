@@ -28,7 +28,7 @@ fn labels(folder: &Path, classes: &[&str]) -> LabelJob {
 /// A job that writes `x.ply` in `folder`.
 fn job(depth_maps: Vec<PathBuf>, labels: Option<LabelJob>, cloud: &Path) -> ConvertJob {
     let outputs = Outputs::of(cloud.to_owned());
-    ConvertJob { depth_maps, working_folder: Some(facade6()), labels, outputs }
+    ConvertJob { depth_maps, working_folder: Some(facade6()), masks: None, labels, outputs }
 }
 
 /// Positions go through `f32` twice on the way to a pixel and back.

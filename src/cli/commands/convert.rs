@@ -24,6 +24,7 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
     let job = ConvertJob {
         depth_maps: args.depth_maps.clone(),
         working_folder: args.working_folder.clone(),
+        masks: resolve::masks(args.ignore_mask_label, args.mask_path.clone())?,
         labels: resolve::labels(&args.labels, &as_typed)?,
         outputs: resolve::outputs(&args.clouds, cloud_path(&args.output)?, PlyLayout::Plain),
     };
