@@ -1,9 +1,10 @@
 //! Third pass: position, colour, normal and weights of the points that were decided on. Rows are independent.
 
 use super::color::nearest_view_color;
-use super::correspond::{Participant, RowMatches};
+use super::correspond::RowMatches;
 use super::merge::{Claim, Member, RowClaims};
 use super::options::AttributeSource;
+use super::participant::{Participant, Pixel};
 use crate::error::Result;
 use crate::scene::{CloudPoint, PointCloud, PointSink, ViewIndex};
 
@@ -36,8 +37,7 @@ impl Accumulator {
         for claim in &claims.claims {
             let members = &claims.members[start..claim.members_end];
             start = claim.members_end;
-            let own = (y * views[0].width + row.columns[claim.column]) as usize;
-            self.seed(&views[0], own, row.points[claim.column]);
+            self.seed(&views[0], y * views[0].width + row.columns[claim.column]);
             for member in members {
                 self.add(&views[member.view as usize], member.pixel);
             }
@@ -46,11 +46,12 @@ impl Accumulator {
         Ok(())
     }
 
-    fn seed(&mut self, view: &Participant<'_>, pixel: usize, point: [f32; 3]) {
-        let weight = view.weight(pixel);
-        self.position = point.map(|v| f64::from(v * weight));
-        self.color = view.color.map_or([0.0; 3], |c| c[pixel].map(|v| f32::from(v) * weight));
-        self.normal = view.normal_in_world(pixel).map(|v| v * weight);
+    fn seed(&mut self, view: &Participant<'_>, pixel: u32) {
+        let i = pixel as usize;
+        let weight = view.pixels[i].weight;
+        self.position = view.point(pixel).map(|v| f64::from(v as f32 * weight));
+        self.color = view.color.map_or([0.0; 3], |c| c[i].map(|v| f32::from(v) * weight));
+        self.normal = view.pixels[i].normal.map(|v| v * weight);
         self.weight = f64::from(weight);
         self.views.clear();
         self.weights.clear();
@@ -60,9 +61,8 @@ impl Accumulator {
 
     fn add(&mut self, view: &Participant<'_>, pixel: u32) {
         let i = pixel as usize;
-        let weight = view.weight(i);
-        let point = view.lens.world_point(pixel % view.width, pixel / view.width, view.depth[i]);
-        let normal = view.normal_in_world(i);
+        let Pixel { weight, normal, .. } = view.pixels[i];
+        let point = view.point(pixel);
         for axis in 0..3 {
             self.position[axis] += point[axis] * f64::from(weight);
             self.normal[axis] += normal[axis] * weight;
@@ -71,9 +71,15 @@ impl Accumulator {
             self.color.iter_mut().zip(color[i]).for_each(|(sum, c)| *sum += f32::from(c) * weight);
         }
         self.weight += f64::from(weight);
-        let at = self.views.partition_point(|&v| v < view.view);
-        self.views.insert(at, view.view);
-        self.weights.insert(at, weight);
+        self.views.push(view.view);
+        self.weights.push(weight);
+        // Few views: the new one is moved to its place step by step.
+        let mut at = self.views.len() - 1;
+        while at > 0 && self.views[at - 1] > self.views[at] {
+            self.views.swap(at - 1, at);
+            self.weights.swap(at - 1, at);
+            at -= 1;
+        }
     }
 
     fn point(

@@ -1,6 +1,6 @@
 //! Colour of a finished point from the view that sees it from nearest.
 
-use super::correspond::Participant;
+use super::participant::Participant;
 
 const WHITE: [u8; 3] = [255; 3];
 
@@ -46,18 +46,20 @@ fn bilinear(point: [f32; 3], view: &Participant<'_>) -> [u8; 3] {
 mod tests {
     use super::*;
     use crate::fusion::FusionMaps;
+    use crate::fusion::participant::ViewPixels;
     use crate::scene::synthetic::{Plane, camera, view_of_plane};
     use crate::scene::{Grid, ViewIndex};
     use std::sync::Arc;
 
     /// A view of 16 × 16 pixels and focal length 16 at `z` on the optical axis, black but for four pixels.
-    fn maps(z: f64, four: [u8; 4]) -> FusionMaps {
+    fn maps(z: f64, four: [u8; 4]) -> ViewPixels {
         let estimate = view_of_plane(0, camera(16, 16, [0.0, 0.0, z], 0.0), Plane::slanted(10.0, 0.0, 0.0));
         let mut color = Grid::filled(estimate.depth.size(), [0; 3]);
         for (pixel, value) in [(2, 1), (3, 1), (2, 2), (3, 2)].into_iter().zip(four) {
             color[pixel] = [value, 0, value];
         }
-        FusionMaps { color: Some(Arc::new(color)), ..FusionMaps::new(Arc::new(estimate)) }
+        let maps = FusionMaps { color: Some(Arc::new(color)), ..FusionMaps::new(Arc::new(estimate)) };
+        ViewPixels::new(maps, true)
     }
 
     /// The point at depth 16 of the view at the origin whose image is at `(u, v)`.
@@ -68,7 +70,7 @@ mod tests {
     #[test]
     fn every_product_is_cut_to_a_whole_number() {
         let maps = maps(0.0, [100, 201, 50, 77]);
-        let view = Participant::new(ViewIndex(0), &maps, true);
+        let view = Participant::new(ViewIndex(0), &maps);
         let color = |u, v| nearest_view_color(point(u, v), &[&view]);
         // 100 · 0.75 + 201 · 0.25 = 75 + 50, 50 · 0.75 + 77 · 0.25 = 37 + 19, (125 + 56) · 0.5 = 62 + 28.
         assert_eq!(color(2.25, 1.5), [90, 0, 90]);
@@ -79,7 +81,7 @@ mod tests {
     #[test]
     fn near_the_border_points_are_white() {
         let maps = maps(0.0, [0; 4]);
-        let view = Participant::new(ViewIndex(0), &maps, true);
+        let view = Participant::new(ViewIndex(0), &maps);
         let is_white = |u, v| nearest_view_color(point(u, v), &[&view]) == WHITE;
         assert!(!is_white(1.0, 1.0) && !is_white(14.0, 14.0));
         assert!(
@@ -94,7 +96,7 @@ mod tests {
     #[test]
     fn the_view_of_smallest_depth_is_asked_and_of_equal_ones_the_first() {
         let (far, near, twin) = (maps(0.0, [10; 4]), maps(8.0, [20; 4]), maps(0.0, [30; 4]));
-        let [far, near, twin] = [&far, &near, &twin].map(|m| Participant::new(ViewIndex(0), m, true));
+        let [far, near, twin] = [&far, &near, &twin].map(|m| Participant::new(ViewIndex(0), m));
         // On the way to the second camera the point's image moves: (-5 / 8 · 16 + 7.5) = -2.5 is outside.
         assert_eq!(nearest_view_color(point(2.5, 1.5), &[&far, &near]), WHITE);
         assert_eq!(nearest_view_color(point(2.5, 1.5), &[&far, &twin])[0], 10);

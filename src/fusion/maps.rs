@@ -25,18 +25,6 @@ impl FusionMaps {
         FusionMaps { estimate, color: None, labels: None, checked_labels: None }
     }
 
-    /// Bytes that the maps hold in memory.
-    pub fn bytes(&self) -> u64 {
-        let size = self.size();
-        let has = |map: bool, bytes: u64| if map { bytes } else { 0 };
-        size.area() as u64
-            * (4 + has(self.estimate.normal.is_some(), 12)
-                + has(self.estimate.confidence.is_some(), 4)
-                + has(self.color.is_some(), 3)
-                + has(self.labels.is_some(), 2)
-                + has(self.checked_labels.is_some(), 2))
-    }
-
     /// Size of the maps.
     pub fn size(&self) -> Size {
         self.estimate.depth.size()

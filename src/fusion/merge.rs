@@ -1,7 +1,8 @@
 //! Second pass: decides in raster order which pixels become points, and claims them. This is the only part of a
 //! view's turn that depends on what came before.
 
-use super::correspond::{Participant, Relation, RowMatches};
+use super::correspond::{Relation, RowMatches};
+use super::participant::Participant;
 use super::state::FreePixels;
 use super::summary::Tally;
 use crate::semantics::{ClassPolicy, Consistency, LabelVote, Vote};
@@ -135,12 +136,12 @@ impl<'a> Merger<'a> {
         }
         let pixel = |m: &Member| (&views[m.view as usize], m.pixel as usize);
         self.vote.clear();
-        self.vote.support(views[0].label(own as usize), views[0].weight(own as usize));
+        self.vote.support(views[0].label(own as usize), views[0].pixels[own as usize].weight);
         for (view, pixel) in members.iter().map(pixel) {
-            self.vote.support(view.label(pixel), view.weight(pixel));
+            self.vote.support(view.label(pixel), view.pixels[pixel].weight);
         }
         for (view, pixel) in self.dissenters.iter().map(pixel) {
-            self.vote.dissent(view.label(pixel), view.weight(pixel));
+            self.vote.dissent(view.label(pixel), view.pixels[pixel].weight);
         }
         let label = self.vote.outcome(views[0].label(own as usize));
         if policy.is_kept(label.label) { Outcome::Point(label) } else { Outcome::ExcludedLabel }

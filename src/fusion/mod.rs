@@ -3,7 +3,7 @@
 //! Maps are immutable; what points claim is kept in one bit per pixel beside them, so maps can leave memory and come
 //! back. A view's turn has three passes over bands of rows: correspondences (parallel), claims (in raster order),
 //! sums (parallel). Only the second depends on order, and it touches bits alone; so the result is the sequential one
-//! for any number of threads.
+//! for any number of threads, and the passes of successive bands run at the same time.
 
 mod accumulate;
 mod color;
@@ -13,6 +13,8 @@ mod merge;
 mod normals;
 mod options;
 mod order;
+mod participant;
+mod pipe;
 mod plan;
 mod state;
 mod stream;

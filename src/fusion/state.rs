@@ -12,10 +12,17 @@ pub(super) struct FreePixels {
 
 impl FreePixels {
     /// All pixels with a depth.
-    pub(super) fn with_depth(depths: &[f32]) -> Self {
-        let word =
-            |chunk: &[f32]| chunk.iter().enumerate().fold(0, |word, (i, &d)| word | u64::from(d > 0.0) << i);
-        FreePixels { words: depths.chunks(64).map(word).collect() }
+    pub(super) fn with_depth(depths: impl ExactSizeIterator<Item = f32>) -> Self {
+        let mut words = vec![0; depths.len().div_ceil(64)];
+        for (i, depth) in depths.enumerate() {
+            words[i / 64] |= u64::from(depth > 0.0) << (i % 64);
+        }
+        FreePixels { words }
+    }
+
+    /// Becomes a copy of `other` in the same memory.
+    pub(super) fn copy(&mut self, other: &FreePixels) {
+        self.words.clone_from(&other.words);
     }
 
     #[inline]
@@ -64,7 +71,7 @@ mod tests {
     #[test]
     fn pixels_are_listed_by_range_and_can_be_taken_and_given_back() {
         let depths: Vec<f32> = (0..200).map(|i| if i % 3 == 0 { 1.0 } else { 0.0 }).collect();
-        let mut free = FreePixels::with_depth(&depths);
+        let mut free = FreePixels::with_depth(depths.iter().copied());
         assert_eq!(free.count(), 67);
         for (start, end) in [(0, 200), (5, 64), (64, 128), (63, 65), (100, 100), (130, 199)] {
             let listed: Vec<usize> = free.in_range(start, end).collect();

@@ -1,21 +1,19 @@
 //! Fusion from the first view to the last: maps come in, points go out, neither is ever complete in memory.
 
-use super::accumulate::Accumulator;
-use super::correspond::{Matching, Participant, RowMatches};
-use super::merge::{Merger, RowClaims};
+use super::correspond::Matching;
+use super::merge::Merger;
+use super::participant::Participant;
+use super::pipe::Pipe;
 use super::plan::FusionPlan;
+use super::state::FreePixels;
 use super::summary::{FusionSummary, Tally};
 use super::unfused::project_maps;
-use super::working_set::WorkingSet;
-use super::{AttributeSource, FusionMaps, FusionOptions, FusionView, MapSource};
+use super::working_set::{WorkingSet, load_checked};
+use super::{AttributeSource, FusionOptions, FusionView, MapSource};
 use crate::error::{Error, Result};
-use crate::progress::{Progress, Stage};
-use crate::scene::{CloudLayout, PointCloud, PointSink, PointSource, ViewIndex};
+use crate::progress::{Progress, Stage, Steps};
+use crate::scene::{CloudLayout, PointSink, ViewIndex};
 use crate::semantics::ClassPolicy;
-use rayon::prelude::*;
-
-/// Free pixels of the reference view that are worked on at a time.
-const BAND_PIXELS: usize = 1 << 16;
 
 /// What is fused.
 #[derive(Clone, Copy)]
@@ -61,147 +59,130 @@ pub fn fuse(
 ) -> Result<FusionSummary> {
     options.check()?;
     let plan = FusionPlan::new(input.views, options);
-    let mut maps = WorkingSet::new(input.views, &plan, input.source, options.map_memory);
     let mut tally = Tally::new(input.policy.is_some());
-    let mut turn = Turn::new(input, &plan, options);
-    let mut depths = 0;
     let stage = if options.number_views_fuse < 2 { Stage::Merge } else { Stage::Fuse };
     let done = progress.start(stage, plan.steps.len());
-    for (i, step) in plan.steps.iter().enumerate() {
-        maps.prepare(i)?;
-        let reference = maps.maps(step.view)?;
-        require_color(step.view, reference, options)?;
-        depths += count_pixels(reference, input.policy, &mut tally) - maps.invalidated(step.view);
-        if options.number_views_fuse < 2 {
-            tally.points += project_maps(step.view, reference, input.policy, input.layout(options), sink)?;
-        } else {
-            turn.take(&step.views().collect::<Vec<_>>(), &mut maps, &mut tally, sink)?;
-        }
-        maps.finish(i);
-        done.step();
-    }
+    let depths = match stage {
+        Stage::Merge => merge_plainly(input, &plan, options, &mut tally, &done, sink)?,
+        _ => fuse_by_turns(input, &plan, options, &mut tally, &done, sink)?,
+    };
     Ok(tally.into_summary(plan.steps.len(), depths))
 }
 
-fn require_color(view: ViewIndex, maps: &FusionMaps, options: &FusionOptions) -> Result<()> {
-    if options.estimate_colors == AttributeSource::None || maps.color.is_some() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
-        "view {} ({}): no image to take colours from; provide it, or give --estimate-colors 0",
-        view.0, maps.estimate.image_name
-    )))
-}
-
-/// Counts the pixels of a view by class; returns the number of depths.
-fn count_pixels(maps: &FusionMaps, policy: Option<&ClassPolicy>, tally: &mut Tally) -> u64 {
-    let depths = maps.estimate.depth.data();
-    if policy.is_some() {
+/// Every depth becomes a point; returns the number of depths.
+fn merge_plainly(
+    input: &FusionInput<'_>,
+    plan: &FusionPlan,
+    options: &FusionOptions,
+    tally: &mut Tally,
+    done: &Steps,
+    sink: &mut dyn PointSink,
+) -> Result<u64> {
+    let mut depths = 0;
+    for step in &plan.steps {
+        let maps = load_checked(input.views, plan, input.source, step.view)?;
+        require_color(step.view, &maps.estimate.image_name, maps.color.is_some(), options)?;
         let labels = maps.labels.as_ref().map(|labels| labels.data());
-        for (i, &depth) in depths.iter().enumerate() {
-            let class = tally.class(labels.map_or(0, |l| l[i]));
-            class.pixels += 1;
-            class.depths += u64::from(depth > 0.0);
-        }
+        depths += count_pixels(maps.estimate.depth.data().iter().copied(), labels, input.policy, tally);
+        tally.points += project_maps(step.view, &maps, input.policy, input.layout(options), sink)?;
+        done.step();
     }
-    depths.iter().map(|&d| u64::from(d > 0.0)).sum()
+    Ok(depths)
 }
 
-/// Buffers for one row, reused from band to band.
-#[derive(Default)]
-struct RowWork {
-    matches: RowMatches,
-    claims: RowClaims,
-    sums: Accumulator,
-    points: PointCloud,
-}
-
-/// One view's turn to start points.
-struct Turn<'a> {
-    matching: Matching<'a>,
-    merger: Merger<'a>,
-    colors: AttributeSource,
-    use_normals: bool,
-    rows: Vec<RowWork>,
-    layout: CloudLayout,
-}
-
-impl<'a> Turn<'a> {
-    fn new(input: &FusionInput<'a>, plan: &FusionPlan, options: &FusionOptions) -> Self {
-        let min_views = (options.number_views_fuse as usize).min(input.views.len());
-        Turn {
-            matching: Matching {
-                max_depth_diff: options.depth_diff_threshold,
-                min_cos_normal: options.min_cos_normal(),
-                policy: input.policy,
-            },
-            merger: Merger::new(min_views, input.policy),
-            colors: options.estimate_colors,
-            use_normals: plan.normals,
-            rows: Vec::new(),
-            layout: input.layout(options),
-        }
-    }
-
-    /// Makes points of the free pixels of the first of `views` and the matching ones of the others.
-    fn take(
-        &mut self,
-        views: &[ViewIndex],
-        maps: &mut WorkingSet<'_>,
-        tally: &mut Tally,
-        sink: &mut dyn PointSink,
-    ) -> Result<()> {
-        let mut free: Vec<_> = views.iter().map(|&v| maps.take_free(v)).collect();
+/// Views take turns to start points; returns the number of depths that were not invalidated before their turn.
+fn fuse_by_turns(
+    input: &FusionInput<'_>,
+    plan: &FusionPlan,
+    options: &FusionOptions,
+    tally: &mut Tally,
+    done: &Steps,
+    sink: &mut dyn PointSink,
+) -> Result<u64> {
+    let min_views = (options.number_views_fuse as usize).min(input.views.len());
+    let matching = Matching {
+        max_depth_diff: options.depth_diff_threshold,
+        min_cos_normal: options.min_cos_normal(),
+        policy: input.policy,
+    };
+    let merger = Merger::new(min_views, input.policy);
+    let mut pipe = Pipe::new(matching, merger, options.estimate_colors, input.layout(options));
+    let mut maps = WorkingSet::new(input, plan, options.map_memory);
+    let mut depths = 0;
+    for (i, step) in plan.steps.iter().enumerate() {
+        maps.prepare(i)?;
+        let views: Vec<ViewIndex> = step.views().collect();
+        let reference = maps.maps(step.view)?;
+        require_color(step.view, &reference.name, reference.has_color(), options)?;
+        depths +=
+            count_pixels(reference.pixels.iter().map(|p| p.depth), reference.labels(), input.policy, tally);
+        depths -= maps.invalidated(step.view);
+        let mut free = views.iter().map(|&v| maps.take_free(v)).collect::<Vec<_>>();
         tally.invalidated.clear();
         tally.invalidated.resize(views.len(), 0);
-        let participants = views
-            .iter()
-            .map(|&v| Ok(Participant::new(v, maps.maps(v)?, self.use_normals)))
-            .collect::<Result<Vec<_>>>()?;
-        if let Some(policy) = self.matching.policy.filter(|policy| !policy.keeps_everything()) {
-            for pixel in free[0].in_range(0, participants[0].depth.len()) {
-                let label = participants[0].label(pixel);
-                if !policy.is_candidate(label) {
-                    tally.class(label).rejected_by_class += 1;
-                }
-            }
-        }
-        let (width, height) = (participants[0].width as usize, participants[0].height as usize);
-        let band = (BAND_PIXELS / width.max(1)).clamp(1, height.max(1));
-        for top in (0..height).step_by(band) {
-            let rows = top as u32..(top + band).min(height) as u32;
-            self.band(&participants, rows, &mut free, tally, sink)?;
-        }
+        let participants =
+            views.iter().map(|&v| Ok(Participant::new(v, maps.maps(v)?))).collect::<Result<Vec<_>>>()?;
+        count_rejected(&participants, &free, input.policy, tally);
+        let mut turn = Ok(());
+        let mut next = Vec::new();
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| next = maps.load_ahead(i + 1));
+            turn = pipe.take_turn(&participants, &mut free, tally, sink);
+        });
+        turn?;
         for ((&view, free), &invalidated) in views.iter().zip(free).zip(&tally.invalidated) {
             maps.restore(view, free);
             maps.add_invalidated(view, invalidated);
         }
-        Ok(())
+        maps.finish(i);
+        maps.insert(next)?;
+        done.step();
     }
+    Ok(depths)
+}
 
-    fn band(
-        &mut self,
-        views: &[Participant<'_>],
-        rows: std::ops::Range<u32>,
-        free: &mut [super::state::FreePixels],
-        tally: &mut Tally,
-        sink: &mut dyn PointSink,
-    ) -> Result<()> {
-        let (top, layout, colors) = (rows.start, self.layout, self.colors);
-        self.rows.resize_with(rows.len().max(self.rows.len()), RowWork::default);
-        let work = &mut self.rows[..rows.len()];
-        let (matching, snapshot) = (&self.matching, &*free);
-        work.par_iter_mut().enumerate().for_each(|(i, row)| {
-            row.matches.compute(views, snapshot, top + i as u32, matching);
-        });
-        for (i, row) in work.iter_mut().enumerate() {
-            self.merger.merge_row(views, top + i as u32, &row.matches, free, &mut row.claims, tally);
+/// Counts the free pixels of the first view that start no point because of their class.
+fn count_rejected(
+    views: &[Participant<'_>],
+    free: &[FreePixels],
+    policy: Option<&ClassPolicy>,
+    tally: &mut Tally,
+) {
+    let Some(policy) = policy.filter(|policy| !policy.keeps_everything()) else { return };
+    for pixel in free[0].in_range(0, views[0].pixels.len()) {
+        let label = views[0].label(pixel);
+        if !policy.is_candidate(label) {
+            tally.class(label).rejected_by_class += 1;
         }
-        work.par_iter_mut().enumerate().try_for_each(|(i, row)| {
-            row.points.reset(layout);
-            let y = top + i as u32;
-            row.sums.emit_row(views, y, &row.matches, &row.claims, colors, &mut row.points)
-        })?;
-        work.iter().try_for_each(|row| row.points.for_each(&mut |point| sink.push(point)))
     }
+}
+
+fn require_color(view: ViewIndex, name: &str, has_color: bool, options: &FusionOptions) -> Result<()> {
+    if options.estimate_colors == AttributeSource::None || has_color {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "view {} ({name}): no image to take colours from; provide it, or give --estimate-colors 0",
+        view.0
+    )))
+}
+
+/// Counts the pixels of a view by class; returns the number of depths.
+fn count_pixels(
+    depths: impl Iterator<Item = f32>,
+    labels: Option<&[u16]>,
+    policy: Option<&ClassPolicy>,
+    tally: &mut Tally,
+) -> u64 {
+    if policy.is_none() {
+        return depths.map(|d| u64::from(d > 0.0)).sum();
+    }
+    let mut count = 0;
+    for (i, depth) in depths.enumerate() {
+        let class = tally.class(labels.map_or(0, |l| l[i]));
+        class.pixels += 1;
+        class.depths += u64::from(depth > 0.0);
+        count += u64::from(depth > 0.0);
+    }
+    count
 }

@@ -1,8 +1,8 @@
 //! Points straight from depth maps, without any test: the plain merge.
 
 use super::FusionMaps;
-use super::correspond::Participant;
 use crate::error::Result;
+use crate::geometry::Lens;
 use crate::scene::{CloudLayout, CloudPoint, PointSink, ViewIndex};
 use crate::semantics::ClassPolicy;
 
@@ -21,24 +21,28 @@ pub fn project_maps(
     sink: &mut dyn PointSink,
 ) -> Result<u64> {
     maps.check(view)?;
-    let pixels = Participant::new(view, maps, true);
+    let estimate = &maps.estimate;
+    let (lens, width) = (Lens::new(&estimate.camera), estimate.depth.width());
+    let labels = maps.labels.as_deref().map(|map| map.data());
+    let colors = maps.color.as_deref().filter(|_| layout.colors).map(|map| map.data());
+    let confidences = estimate.confidence.as_ref().filter(|_| layout.confidence).map(|map| map.data());
+    let normals = estimate.normal.as_ref().map(|map| map.data());
     let views = [view];
     let mut points = 0;
-    for (pixel, &depth) in pixels.depth.iter().enumerate() {
-        let label = pixels.label(pixel);
+    for (pixel, &depth) in estimate.depth.data().iter().enumerate() {
+        let label = labels.map_or(0, |labels| labels[pixel]);
         if depth <= 0.0 || policy.is_some_and(|policy| !policy.is_kept(label)) {
             continue;
         }
-        let (x, y) = (pixel as u32 % pixels.width, pixel as u32 / pixels.width);
-        let color = pixels.color.filter(|_| layout.colors).map(|c| c[pixel]);
-        let confidence = pixels.confidence.filter(|_| layout.confidence).map(|c| c[pixel]);
+        let (x, y) = ((pixel % width) as u32, (pixel / width) as u32);
+        let normal = || normals.map_or([0.0, 0.0, -1.0], |normals| lens.world_direction(normals[pixel]));
         sink.push(&CloudPoint {
-            position: pixels.lens.world_point(x, y, depth).map(|v| v as f32),
-            normal: if layout.normals { pixels.normal_in_world(pixel) } else { [0.0; 3] },
-            color: color.unwrap_or_default(),
+            position: lens.world_point(x, y, depth).map(|v| v as f32),
+            normal: if layout.normals { normal() } else { [0.0; 3] },
+            color: colors.map_or([0; 3], |colors| colors[pixel]),
             views: if layout.views { &views } else { &[] },
             weights: &[],
-            confidence: confidence.unwrap_or_default(),
+            confidence: confidences.map_or(0.0, |confidences| confidences[pixel]),
             label: if layout.labels { label } else { 0 },
             label_confidence: if layout.labels && label != 0 { 1.0 } else { 0.0 },
         })?;

@@ -1,13 +1,13 @@
 use super::*;
 use crate::error::Error;
-use crate::scene::{CloudPoint, PointSink};
+use crate::scene::{CloudPoint, ColorImage, PointSink};
 use std::sync::Mutex;
 use std::sync::Weak;
 
 /// Hands out fresh copies of maps and keeps count of those alive.
 struct CountingSource {
     scene: TestScene,
-    alive: Mutex<(Vec<Weak<DepthEstimate>>, usize, usize)>,
+    alive: Mutex<(Vec<Weak<ColorImage>>, usize, usize)>,
 }
 
 impl CountingSource {
@@ -39,10 +39,11 @@ impl CountingSource {
 impl MapSource for CountingSource {
     fn load(&self, view: ViewIndex) -> Result<FusionMaps> {
         let maps = &self.scene.maps[view.index()];
-        let copy = FusionMaps { estimate: Arc::new((*maps.estimate).clone()), ..maps.clone() };
+        let color = Arc::new(ColorImage::clone(maps.color.as_ref().unwrap()));
+        let copy = FusionMaps { color: Some(Arc::clone(&color)), ..maps.clone() };
         let (alive, most, loads) = &mut *self.alive.lock().unwrap();
         alive.retain(|w| w.strong_count() > 0);
-        alive.push(Arc::downgrade(&copy.estimate));
+        alive.push(Arc::downgrade(&color));
         *most = (*most).max(alive.len());
         *loads += 1;
         Ok(copy)

@@ -57,11 +57,12 @@ impl Blocks {
         self.records
     }
 
-    pub(super) fn append(&mut self, record: &[u8]) -> Result<()> {
-        if !self.open.is_empty() && self.open.len() + record.len() > BLOCK_BYTES {
+    /// Appends a record of `bytes` bytes that `encode` writes.
+    pub(super) fn append(&mut self, bytes: usize, encode: impl FnOnce(&mut Vec<u8>)) -> Result<()> {
+        if !self.open.is_empty() && self.open.len() + bytes > BLOCK_BYTES {
             self.close_block()?;
         }
-        self.open.extend_from_slice(record);
+        encode(&mut self.open);
         self.records += 1;
         Ok(())
     }

@@ -25,7 +25,6 @@ pub struct PointSpool {
     blocks: Blocks,
     crop: Option<(Roi, InsideBits)>,
     count: u64,
-    record: Vec<u8>,
 }
 
 impl PointSpool {
@@ -37,7 +36,6 @@ impl PointSpool {
             blocks: Blocks::new(folder, memory),
             crop: crop.map(|roi| (roi, InsideBits::default())),
             count: 0,
-            record: Vec::new(),
         }
     }
 
@@ -64,10 +62,8 @@ impl PointSink for PointSpool {
         if let Some((roi, inside)) = &mut self.crop {
             inside.push(roi.contains(point.position));
         }
-        self.record.clear();
-        self.format.encode(point, &mut self.record);
         self.count += 1;
-        self.blocks.append(&self.record)
+        self.blocks.append(self.format.len(point), |block| self.format.encode(point, block))
     }
 }
 

@@ -54,6 +54,11 @@ impl RecordFormat {
         }
     }
 
+    /// Length of the record of `point`.
+    pub(super) fn len(&self, point: &CloudPoint<'_>) -> usize {
+        self.fixed + if self.layout.views { point.views.len() * self.per_view } else { 0 }
+    }
+
     /// Length of the record that `bytes` start with.
     pub(super) fn len_of(&self, bytes: &[u8]) -> usize {
         self.fixed + self.view_count(bytes) * self.per_view
