@@ -11,6 +11,7 @@ mod options;
 mod speckle;
 mod unbiased;
 mod warp;
+mod witness;
 
 use crate::scene::{DepthEstimate, LabelMap};
 

@@ -275,11 +275,13 @@ fn read<R: Read>(mut r: Reader<R>) -> Result<DepthMapFile> {
 }
 
 /// A depth or confidence, 0 if it is negative or not finite.
+#[inline]
 fn usable(value: f32) -> f32 {
     if value > 0.0 && value < f32::INFINITY { value } else { 0.0 }
 }
 
 /// A normal, the zero vector if it is not finite.
+#[inline]
 fn finite(normal: [f32; 3]) -> [f32; 3] {
     if normal.iter().all(|v| v.is_finite()) { normal } else { [0.0; 3] }
 }
