@@ -308,9 +308,9 @@ pub(crate) fn outputs(typed: &CloudForms, cloud: PathBuf, layout: PlyLayout) -> 
 /// # Errors
 /// The variable names none or one that the processor lacks.
 pub(crate) fn cpu() -> Result<CpuLevel> {
-    match std::env::var("SEMVS_CPU") {
-        Ok(name) if !name.is_empty() => {
-            name.parse().map_err(|e: Error| Error::invalid(format!("SEMVS_CPU: {e}")))
+    match std::env::var_os("SEMVS_CPU") {
+        Some(name) if !name.is_empty() => {
+            name.to_string_lossy().parse().map_err(|e: Error| Error::invalid(format!("SEMVS_CPU: {e}")))
         }
         _ => Ok(CpuLevel::detect()),
     }

@@ -3,6 +3,7 @@
 use super::console::{Console, Level};
 use super::listen::Recorder;
 use super::one_line::{one_line, printable};
+use super::resolve::cpu;
 use super::semvs_args::{Command, SemvsArgs};
 use super::{commands, complain, exit_code, print};
 use clap::error::ErrorKind;
@@ -65,10 +66,20 @@ fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crat
 /// Help and version are results; anything else is a mistake on the command line.
 fn refuse(error: &clap::Error, failure: ExitCode) -> ExitCode {
     match error.kind() {
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+        ErrorKind::DisplayHelp => {
             print(&error.render().to_string());
             ExitCode::SUCCESS
         }
+        ErrorKind::DisplayVersion => match cpu() {
+            Ok(level) => {
+                print(&format!("{}kernels: {}\n", error.render(), level.name()));
+                ExitCode::SUCCESS
+            }
+            Err(error) => {
+                complain(&format!("error: {}\n", printable(&error.to_string())));
+                failure
+            }
+        },
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             complain(&error.render().to_string());
             failure

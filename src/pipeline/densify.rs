@@ -29,10 +29,10 @@ use nalgebra::Vector3;
 use semvs_formats::Limits;
 use std::path::Path;
 
-/// Least memory for depth maps that are read again soon.
-const MIN_MAP_CACHE: usize = 128 << 20;
-/// Most memory for depth maps that are read again soon.
-const MAX_MAP_CACHE: usize = 4 << 30;
+/// Least memory for depth maps between the passes.
+const MIN_MAP_MEMORY: usize = 176 << 20;
+/// Most memory for depth maps between the passes.
+const MAX_MAP_MEMORY: usize = 4 << 30;
 /// Bytes per pixel of a depth map in memory.
 const MAP_BYTES: usize = 20;
 
@@ -61,7 +61,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     clock.stage("load");
     let mut prepared = prepare(&job.input, loaded, cameras, true, progress)?;
     check_places(&job.outputs, prepared.labels.as_ref().map(Labels::classes))?;
-    let store = caching_store(&job.input, &prepared, &job.depth_maps);
+    let store = store(&job.input, &prepared, &job.depth_maps);
     clock.stage("prepare");
 
     let use_existing = job.stereo.geometric_iterations == 0 || job.input.like_openmvs;
@@ -71,6 +71,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
         true => job.fusion,
         false => possible(&job.fusion, prepared.count(), maps, progress)?,
     };
+    progress.detail(format!("depth maps are estimated with the {} kernels", cpu.name()));
     let estimation = Estimation {
         prepared: &prepared,
         store: &store,
@@ -91,8 +92,11 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
         pictures(".filtered")?;
         clock.stage("filter");
     }
-    let store = plain_store(&prepared, &job.depth_maps);
-    let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
+    let mut report = RunReport {
+        scene: job.input.scene.display().to_string(),
+        cpu_level: Some(cpu.name().to_owned()),
+        ..RunReport::default()
+    };
     if job.depth_maps_only {
         finish_depth_maps(job, &prepared, &mapped, &clock, progress, &mut report)?;
     } else {
@@ -153,14 +157,9 @@ fn depth_map_rows(prepared: &Prepared, store: &DepthStore, mapped: &[ViewIndex],
 }
 
 /// The store of a job's depth maps, with memory for what the threads work on at a time.
-fn caching_store(job: &SceneJob, prepared: &Prepared, folder: &Path) -> DepthStore {
-    let cache = (pixels_in_hand(job, &prepared.cameras) * MAP_BYTES).clamp(MIN_MAP_CACHE, MAX_MAP_CACHE);
-    DepthStore::new(folder, prepared.loaded.search.clone(), cache, Limits::default())
-}
-
-/// The store of depth maps for fusion, which keeps what it needs itself.
-pub(super) fn plain_store(prepared: &Prepared, folder: &Path) -> DepthStore {
-    DepthStore::new(folder, prepared.loaded.search.clone(), 0, Limits::default())
+fn store(job: &SceneJob, prepared: &Prepared, folder: &Path) -> DepthStore {
+    let memory = (pixels_in_hand(job, &prepared.cameras) * MAP_BYTES).clamp(MIN_MAP_MEMORY, MAX_MAP_MEMORY);
+    DepthStore::new(folder, prepared.loaded.search.clone(), memory, Limits::default())
 }
 
 fn finish_depth_maps(

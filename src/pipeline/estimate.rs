@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::progress::{Event, Progress, Stage};
 use crate::scene::{DepthEstimate, ImageId, ViewIndex};
 use crate::stereo::{self, CpuLevel, StereoOptions};
-use crate::store::depth_store::{DepthStore, Existing};
+use crate::store::depth_store::{DepthStore, Existing, Lasting};
 use crate::store::memory;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -116,11 +116,12 @@ impl Estimation<'_> {
             let problem = stereo_problem(self.prepared, view)?;
             let mut estimate = stereo::estimate(&problem, self.options, self.cpu)?;
             self.clean(&mut estimate, last);
-            self.store.write(&estimate)?;
+            let (reference, size) = (estimate.image_id, estimate.depth.size());
+            self.store.write(estimate, self.lasting(last))?;
             self.progress.event(Event::DepthEstimated {
-                reference: estimate.image_id,
+                reference,
                 sources: problem.sources.len(),
-                size: (estimate.depth.size().width, estimate.depth.size().height),
+                size: (size.width, size.height),
                 elapsed: start.elapsed(),
             });
             steps.step();
@@ -145,7 +146,7 @@ impl Estimation<'_> {
                 let mut estimate =
                     stereo::refine_geometric(&problem, &previous, &sources, pass, self.options, self.cpu)?;
                 self.clean(&mut estimate, last);
-                self.store.write_pending(&estimate)?;
+                self.store.write_pending(estimate, self.lasting(last))?;
                 steps.step();
                 Ok(())
             })
@@ -163,10 +164,15 @@ impl Estimation<'_> {
             estimate.image_name.clone_from(&self.prepared.loaded.scene.views[view.index()].name);
             self.clean(&mut estimate, true);
             if estimate.depth != before.depth {
-                self.store.write(&estimate)?;
+                self.store.write(estimate, self.lasting(true))?;
             }
             Ok(())
         })
+    }
+
+    /// What the maps of a pass are: results after the `last` one, unless the filter across views follows.
+    fn lasting(&self, last: bool) -> Lasting {
+        if last && self.filter.across.is_none() { Lasting::Result } else { Lasting::Passing }
     }
 
     fn clean(&self, estimate: &mut DepthEstimate, last: bool) {

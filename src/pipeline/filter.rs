@@ -9,7 +9,7 @@ use crate::depth_filter::{
 use crate::error::Result;
 use crate::progress::{Event, Progress, Stage};
 use crate::scene::{DepthEstimate, DepthMap, ImageId, ViewIndex};
-use crate::store::depth_store::DepthStore;
+use crate::store::depth_store::{DepthStore, Lasting};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
@@ -51,8 +51,8 @@ pub(super) fn filter_across_views(
                 AcrossViews::Unbiased(options) => filter_unbiased(&own, &against, options),
             };
             filtered.image_name.clone_from(&prepared.loaded.scene.views[view.index()].name);
-            store.write_pending(&filtered)?;
             let (before, after) = (valid_depths(&reference.depth), valid_depths(&filtered.depth));
+            store.write_pending(filtered, Lasting::Result)?;
             progress.event(Event::DepthFiltered {
                 reference: prepared.id(view),
                 sources: against.len(),

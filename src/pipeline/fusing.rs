@@ -139,7 +139,7 @@ struct FusionSource<'a> {
 
 impl MapSource for FusionSource<'_> {
     fn load(&self, view: ViewIndex) -> Result<FusionMaps> {
-        let mut estimate = self.store.read(self.prepared.id(view))?;
+        let mut estimate = self.store.take(self.prepared.id(view))?;
         if let Some(masks) = &self.prepared.masks {
             estimate = masks.unmasked(view, estimate)?;
         }

@@ -1,6 +1,5 @@
 //! What a run did, for its report.
 
-use super::filter::valid_depths;
 use super::prepare::Prepared;
 use crate::error::{Error, Result};
 use crate::report::{RunReport, StageTime, ViewReport};
@@ -95,17 +94,12 @@ pub(super) fn view_rows(
                 ..ViewReport::default()
             };
             if mapped.binary_search(&view).is_ok() {
-                let map = store.read(views[i].id)?;
-                let size = map.depth.size();
-                let valid = valid_depths(&map.depth);
-                (row.width, row.height) = (size.width, size.height);
+                let map = store.summary(views[i].id)?;
+                (row.width, row.height) = (map.size.width, map.size.height);
                 row.depth_range = [map.depth_range.0, map.depth_range.1];
-                row.valid_depths = valid as u64;
-                row.coverage = valid as f64 / size.area().max(1) as f64;
-                row.mean_confidence = map.confidence.as_ref().filter(|_| valid > 0).map(|confidence| {
-                    let pairs = confidence.data().iter().zip(map.depth.data());
-                    pairs.filter(|(_, d)| **d > 0.0).map(|(c, _)| f64::from(*c)).sum::<f64>() / valid as f64
-                });
+                row.valid_depths = map.valid_depths;
+                row.coverage = map.valid_depths as f64 / map.size.area().max(1) as f64;
+                row.mean_confidence = map.mean_confidence;
             }
             Ok(row)
         })

@@ -11,6 +11,8 @@ pub struct RunReport {
     pub program: String,
     /// Its version.
     pub version: String,
+    /// Instruction set of the estimator's kernels; `None` = nothing is estimated.
+    pub cpu_level: Option<String>,
     /// The scene as given on the command line.
     pub scene: String,
     /// Every option in effect under its command-line name.
@@ -127,6 +129,7 @@ mod tests {
         RunReport {
             program: "semvs densify".into(),
             version: "0.1.0".into(),
+            cpu_level: Some("avx2".into()),
             scene: "scene.mvs".into(),
             options: [("number-views-fuse".to_owned(), serde_json::json!(2))].into_iter().collect(),
             stages: vec![StageTime { stage: "fusion".into(), seconds: 1.25, cpu_seconds: None }],
@@ -156,6 +159,7 @@ mod tests {
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(json["options"]["number-views-fuse"], 2);
         assert_eq!(json["stages"][0]["seconds"], 1.25);
+        assert_eq!(json["cpu_level"], "avx2");
         assert_eq!(json["classes"][0]["name"], "wall");
         assert_eq!(json["classes"][0]["mean_confidence"], serde_json::Value::Null);
         assert_eq!(json["views"][0]["id"], 12);

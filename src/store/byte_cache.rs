@@ -77,11 +77,6 @@ impl<K: Hash + Eq + Copy, V> ByteCache<K, V> {
         }
     }
 
-    /// Forgets the value of `key`.
-    pub(crate) fn remove(&self, key: K) {
-        self.lock().remove(&key);
-    }
-
     /// A thread that panicked while it held the lock left consistent counters: every change above is completed
     /// before anything that could panic.
     fn lock(&self) -> MutexGuard<'_, State<K, V>> {
@@ -118,8 +113,6 @@ mod tests {
         assert!(!load(&cache, 1, 10));
         assert!(load(&cache, 4, 10));
         assert!(!load(&cache, 1, 10) && !load(&cache, 3, 10) && !load(&cache, 4, 10));
-        assert!(load(&cache, 2, 10));
-        cache.remove(2);
         assert!(load(&cache, 2, 10));
     }
 

@@ -43,6 +43,21 @@ pub(super) fn estimate_from_file(file: DepthMapFile) -> Result<DepthEstimate, St
     })
 }
 
+/// Changes values that mean nothing to what they are once they have been written and read: depths and confidences that are
+/// negative or not finite and confidences without a depth to 0, normals that are not finite to none.
+pub(super) fn make_readable(estimate: &mut DepthEstimate) {
+    let usable = |v: f32| if v > 0.0 && v < f32::INFINITY { v } else { 0.0 };
+    estimate.depth.data_mut().iter_mut().for_each(|d| *d = usable(*d));
+    for normal in estimate.normal.iter_mut().flat_map(|map| map.data_mut()) {
+        if !normal.iter().all(|v| v.is_finite()) {
+            *normal = [0.0; 3];
+        }
+    }
+    for (c, &d) in estimate.confidence.iter_mut().flat_map(|map| map.data_mut()).zip(estimate.depth.data()) {
+        *c = if d == 0.0 { 0.0 } else { usable(*c) };
+    }
+}
+
 /// A plane that may be absent.
 fn plane<T>(size: Size, data: Vec<T>) -> Result<Option<Grid<T>>, ()> {
     if data.is_empty() { Ok(None) } else { Grid::from_vec(size, data).map(Some).ok_or(()) }
@@ -108,6 +123,23 @@ mod tests {
     #[test]
     fn no_depth_means_no_confidence() {
         assert_eq!(estimate_from_file(file()).unwrap().confidence.unwrap().data(), [0.0, 0.5]);
+    }
+
+    #[test]
+    fn what_means_nothing_is_made_what_readers_see() {
+        let mut odd = file();
+        (odd.image_width, odd.width) = (8, 8);
+        odd.depth = vec![0.0, 5.0, -1.0, f32::NAN, f32::INFINITY, 2.0, 3.0, 4.0];
+        odd.confidence = vec![0.75, 0.5, 0.5, 0.5, 0.5, -1.0, f32::NAN, 1.5];
+        odd.normal = vec![[0.0, 0.0, -1.0]; 8];
+        odd.normal[6] = [f32::NAN, 0.0, 0.0];
+        odd.views.clear();
+        let mut bytes = Vec::new();
+        odd.write(&mut bytes).unwrap();
+        let read = DepthMapFile::from_bytes(&bytes, &semvs_formats::Limits::default()).unwrap();
+        let mut made = estimate_from_file(odd).unwrap();
+        make_readable(&mut made);
+        assert_eq!(made, estimate_from_file(read).unwrap());
     }
 
     #[test]

@@ -1,9 +1,10 @@
-//! The depth maps of a scene, one `.dmap` file per view, and the ones read lately.
+//! The depth maps of a scene, one `.dmap` file per view, as many as fit in memory too.
 
 use super::atomic::AtomicFile;
-use super::byte_cache::ByteCache;
 use super::colmap::{ColmapMapHeader, ColmapMaps};
-use super::depth_map::{estimate_from_file, file_from_estimate};
+use super::depth_map::{estimate_from_file, file_from_estimate, make_readable};
+use super::held_maps::{HeldMaps, Slot};
+use super::map_summary::{MapSummary, Summaries};
 use super::paths::{SearchPath, name_relative_to};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -30,23 +31,33 @@ pub enum Existing {
     Unusable(String),
 }
 
+/// Whether a depth map is a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lasting {
+    /// It is, and has a file.
+    Result,
+    /// Another one will take its place before the run ends: it gets a file only if it does not fit in memory.
+    Passing,
+}
+
 /// The depth maps in one folder. May be used by many threads at once.
 #[derive(Debug)]
 pub struct DepthStore {
     folder: PathBuf,
     images: SearchPath,
     limits: Limits,
-    cache: ByteCache<ImageId, DepthEstimate>,
+    held: HeldMaps,
+    summaries: Summaries,
     /// The maps of a COLMAP workspace instead of those in `folder`; they are only read.
     colmap: Option<ColmapMaps>,
 }
 
 impl DepthStore {
-    /// The depth maps in `folder`, of which up to `cache_bytes` are kept in memory. `images` says what the image
+    /// The depth maps in `folder`, of which up to `memory` bytes are held in memory. `images` says what the image
     /// names of estimates mean, so that files can name them relative to `folder`.
-    pub fn new(folder: &Path, images: SearchPath, cache_bytes: usize, limits: Limits) -> Self {
-        let cache = ByteCache::new(cache_bytes);
-        DepthStore { folder: folder.to_owned(), images, limits, cache, colmap: None }
+    pub fn new(folder: &Path, images: SearchPath, memory: usize, limits: Limits) -> Self {
+        let (held, summaries) = (HeldMaps::new(memory), Summaries::default());
+        DepthStore { folder: folder.to_owned(), images, limits, held, summaries, colmap: None }
     }
 
     /// The maps of a COLMAP workspace. Nothing can be written; nothing is kept in memory.
@@ -113,46 +124,89 @@ impl DepthStore {
         }
     }
 
-    /// The depth map of a view, from memory if it was read lately.
+    /// The depth map of a view, from memory if it is there.
     ///
     /// # Errors
     /// The file is missing or damaged, or is the map of another image.
     pub fn read(&self, id: ImageId) -> Result<Arc<DepthEstimate>> {
-        self.cache.get_or_load(id, || {
-            let path = self.path(id);
-            let estimate = match &self.colmap {
-                Some(maps) => maps.read(id)?,
-                None => read_depth_map(&path, self.limits)?,
-            };
-            if estimate.image_id != id {
-                let what = format!(
-                    "this is the depth map of image {}, not {id}; estimate it again",
-                    estimate.image_id
-                );
-                return Err(Error::content(&path, what));
-            }
-            let bytes = bytes_of(&estimate);
-            Ok((estimate, bytes))
-        })
+        if let Some(held) = self.held.get(id) {
+            return Ok(held);
+        }
+        let estimate = Arc::new(self.read_file(id)?);
+        self.held.hold_read(&estimate);
+        Ok(estimate)
     }
 
-    /// Writes the depth map of `estimate.image_id`, whole or not at all.
+    /// The depth map of a view for whoever needs it last: if there is a file, memory holds it no longer.
     ///
     /// # Errors
-    /// The file cannot be written, or the estimate cannot be stored (sizes that differ, more than 254 sources).
-    pub fn write(&self, estimate: &DepthEstimate) -> Result<()> {
-        self.write_to(&self.path(estimate.image_id), estimate)?;
-        self.cache.remove(estimate.image_id);
-        Ok(())
+    /// As [`DepthStore::read`].
+    pub fn take(&self, id: ImageId) -> Result<Arc<DepthEstimate>> {
+        match self.held.take(id) {
+            Some(held) => Ok(held),
+            None => Ok(Arc::new(self.read_file(id)?)),
+        }
     }
 
-    /// Writes a depth map beside the current one, which stays readable until [`DepthStore::publish`]: a pass that
+    /// What a report says of the depth map of a view; it is read only if it was neither read nor written before.
+    ///
+    /// # Errors
+    /// As [`DepthStore::read`].
+    pub fn summary(&self, id: ImageId) -> Result<MapSummary> {
+        match self.summaries.get(id) {
+            Some(summary) => Ok(summary),
+            None => Ok(MapSummary::of(&*self.take(id)?)),
+        }
+    }
+
+    fn read_file(&self, id: ImageId) -> Result<DepthEstimate> {
+        let path = self.path(id);
+        let estimate = match &self.colmap {
+            Some(maps) => maps.read(id)?,
+            None => read_depth_map(&path, self.limits)?,
+        };
+        if estimate.image_id != id {
+            let what =
+                format!("this is the depth map of image {}, not {id}; estimate it again", estimate.image_id);
+            return Err(Error::content(&path, what));
+        }
+        self.summaries.enter(&estimate);
+        Ok(estimate)
+    }
+
+    /// Makes `estimate` the depth map of its view.
+    ///
+    /// # Errors
+    /// The file cannot be written whole, or the estimate cannot be stored (sizes that differ, more than 254 sources).
+    pub fn write(&self, estimate: DepthEstimate, lasting: Lasting) -> Result<()> {
+        self.put(Slot::Current, estimate, lasting)
+    }
+
+    /// Keeps a depth map beside the current one, which stays readable until [`DepthStore::publish`]: a pass that
     /// reads its neighbours' maps must not see maps of its own.
     ///
     /// # Errors
     /// As [`DepthStore::write`].
-    pub fn write_pending(&self, estimate: &DepthEstimate) -> Result<()> {
-        self.write_to(&self.pending_path(estimate.image_id), estimate)
+    pub fn write_pending(&self, estimate: DepthEstimate, lasting: Lasting) -> Result<()> {
+        self.put(Slot::Pending, estimate, lasting)
+    }
+
+    fn put(&self, slot: Slot, mut estimate: DepthEstimate, lasting: Lasting) -> Result<()> {
+        make_readable(&mut estimate);
+        let (id, estimate) = (estimate.image_id, Arc::new(estimate));
+        if lasting == Lasting::Passing && self.colmap.is_none() && self.held.hold(slot, &estimate, false) {
+            return Ok(());
+        }
+        // A reader must not find the old map in memory once the new one is in the file, or the other way round.
+        self.held.remove(id, slot);
+        let path = match slot {
+            Slot::Current => self.path(id),
+            Slot::Pending => self.pending_path(id),
+        };
+        self.write_to(&path, &estimate)?;
+        self.summaries.enter(&estimate);
+        self.held.hold(slot, &estimate, true);
+        Ok(())
     }
 
     /// Puts the pending depth map of a view in the place of the current one.
@@ -160,14 +214,17 @@ impl DepthStore {
     /// # Errors
     /// There is none, or it cannot be renamed.
     pub fn publish(&self, id: ImageId) -> Result<()> {
+        if self.held.publish(id) == Some(false) {
+            return Ok(());
+        }
         let (pending, path) = (self.pending_path(id), self.path(id));
-        std::fs::rename(&pending, &path).map_err(|e| Error::io(&pending, "rename", e))?;
-        self.cache.remove(id);
-        Ok(())
+        std::fs::rename(&pending, &path).map_err(|e| Error::io(&pending, "rename", e))
     }
 
     /// Deletes the pending depth map of a view, if there is one and it can be.
     pub fn discard_pending(&self, id: ImageId) {
+        self.held.remove(id, Slot::Pending);
+        self.summaries.forget(id);
         // What remains is overwritten by the next run.
         let _ = std::fs::remove_file(self.pending_path(id));
     }
@@ -179,7 +236,7 @@ impl DepthStore {
     pub fn delete(&self, id: ImageId) -> Result<()> {
         self.check_ours()?;
         let path = self.path(id);
-        self.cache.remove(id);
+        self.held.remove(id, Slot::Current);
         match std::fs::remove_file(&path) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&path, "delete", e)),
             _ => Ok(()),
@@ -248,13 +305,6 @@ pub fn write_depth_map(path: &Path, estimate: &DepthEstimate, image_name: &str) 
     let mut out = AtomicFile::create(path)?;
     file.write(&mut out).map_err(|e| Error::writing(path, e))?;
     out.commit()
-}
-
-/// Bytes that an estimate takes in memory, but for small change.
-fn bytes_of(estimate: &DepthEstimate) -> usize {
-    let normal = estimate.normal.as_ref().map_or(0, |map| size_of_val(map.data()));
-    let confidence = estimate.confidence.as_ref().map_or(0, |map| size_of_val(map.data()));
-    size_of_val(estimate.depth.data()) + normal + confidence
 }
 
 /// Largest difference of focal length and principal point in pixels of the map. Programs scale intrinsics in `f32`
@@ -329,7 +379,8 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let store = store(scratch.path());
         let written = estimate(12, 4.0);
-        store.write(&written).unwrap();
+        store.write(written.clone(), Lasting::Result).unwrap();
+        store.take(ImageId(12)).unwrap();
         let read = store.read(ImageId(12)).unwrap();
         assert_eq!(read.image_name, "../project/images/a.jpg");
         assert_eq!(*read, DepthEstimate { image_name: read.image_name.clone(), ..written });
@@ -341,15 +392,15 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let store = store(scratch.path());
         let depth = || store.read(ImageId(5)).unwrap().depth[(0, 0)];
-        store.write(&estimate(5, 1.0)).unwrap();
+        store.write(estimate(5, 1.0), Lasting::Result).unwrap();
         assert_eq!(depth(), 1.0);
-        store.write(&estimate(5, 2.0)).unwrap();
+        store.write(estimate(5, 2.0), Lasting::Result).unwrap();
         assert_eq!(depth(), 2.0);
-        store.write_pending(&estimate(5, 3.0)).unwrap();
+        store.write_pending(estimate(5, 3.0), Lasting::Result).unwrap();
         assert_eq!(depth(), 2.0);
         store.publish(ImageId(5)).unwrap();
         assert_eq!(depth(), 3.0);
-        store.write_pending(&estimate(5, 4.0)).unwrap();
+        store.write_pending(estimate(5, 4.0), Lasting::Result).unwrap();
         store.discard_pending(ImageId(5));
         store.discard_pending(ImageId(5));
         assert_eq!(depth(), 3.0);
@@ -361,6 +412,34 @@ mod tests {
     }
 
     #[test]
+    fn passing_maps_have_a_file_only_where_memory_is_short() {
+        let scratch = tempfile::tempdir().unwrap();
+        // 120 bytes each.
+        let store = DepthStore { held: HeldMaps::new(300), ..store(scratch.path()) };
+        let depth = |id| store.read(ImageId(id)).unwrap().depth[(0, 0)];
+        let files = || std::fs::read_dir(store.folder()).map_or(0, Iterator::count);
+        for id in 1..=3 {
+            store.write(estimate(id, 1.0), Lasting::Passing).unwrap();
+        }
+        assert_eq!(files(), 1, "two of three fit");
+        for id in 1..=3 {
+            store.write_pending(estimate(id, 2.0), Lasting::Passing).unwrap();
+        }
+        assert_eq!([1, 2, 3].map(depth), [1.0; 3]);
+        (1..=3).for_each(|id| store.publish(ImageId(id)).unwrap());
+        assert_eq!([1, 2, 3].map(depth), [2.0; 3]);
+        for id in 1..=3 {
+            store.write_pending(estimate(id, 3.0), Lasting::Result).unwrap();
+        }
+        (1..=3).for_each(|id| store.publish(ImageId(id)).unwrap());
+        assert_eq!(files(), 3);
+        assert_eq!([1, 2, 3].map(|id| store.take(ImageId(id)).unwrap().depth[(0, 0)]), [3.0; 3]);
+        std::fs::remove_file(store.path(ImageId(1))).unwrap();
+        assert!(store.read(ImageId(1)).is_err(), "whoever needed it last has taken it");
+        assert_eq!(store.summary(ImageId(1)).unwrap().valid_depths, 6);
+    }
+
+    #[test]
     fn an_existing_map_must_be_of_this_image_size_and_camera() {
         let scratch = tempfile::tempdir().unwrap();
         let store = store(scratch.path());
@@ -368,7 +447,7 @@ mod tests {
         let (size, k, rotation, center) =
             (ours.camera.size(), *ours.camera.k(), *ours.camera.rotation(), *ours.camera.center());
         assert!(matches!(store.existing(ImageId(5), &ours.camera), Existing::Absent));
-        store.write(&ours).unwrap();
+        store.write(ours.clone(), Lasting::Result).unwrap();
         let verdict = |camera: Camera| match store.existing(ImageId(5), &camera) {
             Existing::Absent => panic!("absent"),
             Existing::Usable => String::new(),
@@ -403,7 +482,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let store = store(scratch.path());
         for id in 0..8 {
-            store.write(&estimate(id, 1.0 + id as f32)).unwrap();
+            store.write(estimate(id, 1.0 + id as f32), Lasting::Result).unwrap();
         }
         std::thread::scope(|scope| {
             for start in 0..4 {

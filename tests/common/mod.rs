@@ -164,7 +164,19 @@ impl Scratch {
 
     /// Runs `program` in the folder.
     pub(crate) fn run<S: AsRef<OsStr>>(&self, program: &str, args: &[S]) -> Outcome {
-        let output = Command::new(program).args(args).current_dir(self.folder.path()).output().unwrap();
+        self.run_with(program, args, &[])
+    }
+
+    /// Runs `program` in the folder with more variables in its environment.
+    pub(crate) fn run_with<S: AsRef<OsStr>>(
+        &self,
+        program: &str,
+        args: &[S],
+        variables: &[(&str, &str)],
+    ) -> Outcome {
+        let mut command = Command::new(program);
+        command.args(args).current_dir(self.folder.path()).envs(variables.iter().copied());
+        let output = command.output().unwrap();
         Outcome {
             code: output.status.code(),
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),

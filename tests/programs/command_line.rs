@@ -1,6 +1,6 @@
 //! What the programs accept, refuse and say: spellings, names of outputs, exit codes, help.
 
-use crate::common::{self, DENSIFY, FUSE_ONLY, SEMVS, Scratch};
+use crate::common::{self, DENSIFY, FUSE_ONLY, SEMVS, SMALL, Scratch};
 use semvs_formats::mvs::{ArchiveKind, Container, Image, SceneFile};
 use std::path::Path;
 
@@ -45,10 +45,61 @@ impl common::Outcome {
     }
 }
 
+/// Names of the instruction sets, and whether this processor has them.
+fn cpu_levels() -> [(&'static str, bool); 3] {
+    [semvs::stereo::CpuLevel::Scalar, semvs::stereo::CpuLevel::Avx2, semvs::stereo::CpuLevel::Avx512]
+        .map(|level| (level.name(), level.is_supported()))
+}
+
 #[test]
-fn version_is_a_result() {
-    let out = Scratch::new().semvs("--version").ok();
-    assert_eq!(out.stdout, format!("semvs {}\n", env!("CARGO_PKG_VERSION")));
+fn version_is_a_result_and_tells_the_kernels() {
+    let scratch = Scratch::new();
+    let version = |level: &str| format!("semvs {}\nkernels: {level}\n", env!("CARGO_PKG_VERSION"));
+    let best = semvs::stereo::CpuLevel::detect().name();
+    assert_eq!(scratch.semvs("--version").ok().stdout, version(best));
+    assert_eq!(scratch.run_with(SEMVS, &["-V"], &[("SEMVS_CPU", "")]).ok().stdout, version(best));
+    for (level, is_supported) in cpu_levels() {
+        let out = scratch.run_with(SEMVS, &["--version"], &[("SEMVS_CPU", level)]);
+        match is_supported {
+            true => assert_eq!(out.ok().stdout, version(level)),
+            false => drop(out.fails_naming(&["SEMVS_CPU", level, "processor"])),
+        }
+    }
+}
+
+#[test]
+fn kernels_are_chosen_by_a_variable_and_told_in_reports() {
+    let scratch = Scratch::facade6();
+    let words = format!(
+        "densify scene.mvs {SMALL} -v --number-views 2 --iters 1 --geometric-iters 0 --report r.json"
+    );
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let out = scratch.run_with(SEMVS, &words, &[("SEMVS_CPU", "scalar")]).ok();
+    assert!(out.stderr.contains("with the scalar kernels"), "{}", out.stderr);
+    let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
+    assert_eq!(report["cpu_level"], "scalar");
+    let best = semvs::stereo::CpuLevel::detect().name();
+    scratch.semvs(&words.join(" ")).ok();
+    let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
+    assert_eq!(report["cpu_level"], best);
+    // Nothing is estimated, so no kernels.
+    scratch.semvs("fuse scene.mvs --depth-maps . -o f.ply --report r.json").ok();
+    let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
+    assert!(report["cpu_level"].is_null());
+}
+
+#[test]
+fn unknown_kernels_are_one_line_before_any_work() {
+    let scratch = Scratch::facade6();
+    let before = scratch.files();
+    let unknown = [("SEMVS_CPU", "sse9")];
+    let needles = ["SEMVS_CPU", "sse9", "scalar", "avx2", "avx512"];
+    scratch.run_with(SEMVS, &["--version"], &unknown).fails_naming(&needles);
+    scratch.run_with(SEMVS, &["densify", "scene.mvs"], &unknown).fails_naming(&needles);
+    assert_eq!(scratch.files(), before);
+    scratch.run_with(DENSIFY, &["scene.mvs"], &unknown).fails_naming(&needles);
+    let new: Vec<_> = scratch.files().into_iter().filter(|file| !before.contains(file)).collect();
+    assert!(new.iter().all(|file| file.ends_with(".log")), "{new:?}");
 }
 
 #[test]
