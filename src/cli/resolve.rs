@@ -226,6 +226,23 @@ pub(crate) fn masks(ignore: i32, folder: Option<PathBuf>) -> Result<Option<MaskJ
     Ok(Some(MaskJob { ignore, folder }))
 }
 
+/// What the options ask to do with classes.
+pub(crate) fn rules(typed: &LabelInput) -> ClassRules {
+    let names = |list: &[String]| {
+        list.iter().map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect::<Vec<String>>()
+    };
+    ClassRules {
+        classes: names(&typed.classes),
+        exclude: names(&typed.exclude_classes),
+        consistency: match typed.label_consistency {
+            Some(ConsistencyMode::Off) => Consistency::Off,
+            Some(ConsistencyMode::Strict) => Consistency::Strict,
+            Some(ConsistencyMode::Support) | None => Consistency::Support,
+        },
+        border: typed.label_border,
+    }
+}
+
 /// The labels that the options ask for.
 ///
 /// # Errors
@@ -243,19 +260,7 @@ pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Re
             WhenMissing::Void => MissingLabels::Void,
         },
     };
-    let names = |list: &[String]| {
-        list.iter().map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect::<Vec<String>>()
-    };
-    let rules = ClassRules {
-        classes: names(&typed.classes),
-        exclude: names(&typed.exclude_classes),
-        consistency: match typed.label_consistency {
-            Some(ConsistencyMode::Off) => Consistency::Off,
-            Some(ConsistencyMode::Strict) => Consistency::Strict,
-            Some(ConsistencyMode::Support) | None => Consistency::Support,
-        },
-        border: typed.label_border,
-    };
+    let rules = rules(typed);
     if sources.are_given() {
         return Ok(Some(LabelJob { sources, rules }));
     }

@@ -149,15 +149,15 @@ Examples:
   semvs fuse scene.mvs --depth-maps depthmaps -o facade.ply --label-path labels \\
       --class-table 3dom-facade --classes building,window,door --label-consistency strict";
 
-/// Turn depth maps into a cloud, every depth a point, without fusion
+/// Turn depth maps into a cloud, every depth a point, without fusion; or a cloud into other formats
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = CONVERT_EXAMPLES,
     mut_args(|arg| if NOT_FOR_CONVERT.contains(&arg.get_id().as_str()) { arg.hide(true) } else { arg })
 )]
 pub(crate) struct ConvertArgs {
-    /// Depth maps (.dmap)
-    #[arg(value_name = "FILE.dmap", required = true)]
+    /// Depth maps (.dmap), or one cloud (.ply)
+    #[arg(value_name = "FILE", required = true)]
     pub(crate) depth_maps: Vec<PathBuf>,
     /// Cloud to write, .ply, .las or .laz
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT")]
@@ -184,7 +184,9 @@ const NOT_FOR_CONVERT: &[&str] = &["label_consistency", "label_border"];
 const CONVERT_EXAMPLES: &str = "\
 Examples:
   semvs convert depthmaps/depth0000.dmap -o view0.ply
-  semvs convert depthmaps/*.dmap -o all.ply --label-path labels --class-table 3dom-facade";
+  semvs convert depthmaps/*.dmap -o all.ply --label-path labels --class-table 3dom-facade
+  semvs convert cloud.ply -o cloud.laz --class-table 3dom-facade --offset 500000,5200000,0
+      a labelled cloud as LAZ, with the classification codes of the table, in its place in the world";
 
 /// Say what a file holds: scene, depth map, cloud, class table, label map
 #[derive(Clone, Debug, Args)]

@@ -13,6 +13,7 @@ use crate::report::{OutputReport, RunReport};
 use crate::scene::{CloudLayout, PointSource, ResolutionOptions, ViewIndex};
 use crate::store::depth_store::{read_depth_header, read_depth_map};
 use crate::store::images::{image_size, load_working_color};
+use crate::store::import::check_working_folder;
 use crate::store::labels::LabelRequest;
 use crate::store::masks::default_mask_name;
 use crate::store::paths::SearchPath;
@@ -44,6 +45,7 @@ pub struct ConvertJob {
 /// An unreadable file, or an output that cannot be written.
 pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
     job.outputs.check(job.labels.is_some())?;
+    job.working_folder.as_deref().map_or(Ok(()), check_working_folder)?;
     let classes = job.labels.as_ref().map(Classes::of).transpose()?;
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
     check_once_each(&job.depth_maps)?;
@@ -74,7 +76,7 @@ pub fn convert(job: &ConvertJob, progress: &Progress) -> Result<RunReport> {
     }
     let cloud = spool.finish()?;
     let written = write_cloud(&job.outputs, &cloud, labels.as_ref(), Placement::default(), progress)?;
-    let outputs: Vec<OutputReport> = cloud_rows(&written, labels.as_ref());
+    let outputs: Vec<OutputReport> = cloud_rows(&written, labels.as_ref().map(Labels::table));
     Ok(RunReport { points: cloud.len(), outputs, ..RunReport::default() })
 }
 

@@ -59,8 +59,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     }
     check_depth_maps(&loaded, &cameras, &job.depth_maps)?;
     clock.stage("load");
-    let mut prepared = prepare(&job.input, loaded, cameras, true, progress)?;
-    check_places(&job.outputs, prepared.labels.as_ref().map(Labels::classes))?;
+    let mut prepared = prepare(&job.input, &job.outputs, loaded, cameras, true, progress)?;
     let store = store(&job.input, &prepared, &job.depth_maps);
     clock.stage("prepare");
 
@@ -242,7 +241,7 @@ pub(super) fn write_results(
     let place = placement(outputs, &prepared.loaded.archive, progress);
     let written = write_cloud(outputs, cloud, labels, place, progress)?;
     report.points = fused.cloud.len();
-    report.outputs.extend(cloud_rows(&written, labels));
+    report.outputs.extend(cloud_rows(&written, labels.map(Labels::table)));
     if let Some(labels) = labels {
         report.classes = class_rows(&fused.summary, &written, labels);
     }

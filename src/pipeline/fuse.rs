@@ -7,7 +7,6 @@ use super::job::{DepthMapsJob, FuseJob};
 use super::outputs::{check_places, check_report};
 use super::prepare::{load, prepare};
 use super::record::{Clock, view_rows, with_threads};
-use super::skip::Labels;
 use crate::error::{Error, Result};
 use crate::fusion::AttributeSource;
 use crate::geometry::{Camera, Size};
@@ -49,10 +48,9 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let mapped = maps_of_the_scene(&loaded, &cameras, &store, job.input.strict, progress)?;
     clock.stage("load");
     let decode = job.fusion.estimate_colors != AttributeSource::None;
-    let prepared = prepare(&job.input, loaded, cameras, decode, progress)?;
+    let prepared = prepare(&job.input, &job.outputs, loaded, cameras, decode, progress)?;
     let mapped: Vec<ViewIndex> =
         mapped.into_iter().filter(|v| prepared.cameras[v.index()].is_some()).collect();
-    check_places(&job.outputs, prepared.labels.as_ref().map(Labels::classes))?;
     let fusion = possible(&job.fusion, prepared.count(), mapped.len(), progress)?;
     clock.stage("prepare");
 

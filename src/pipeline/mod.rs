@@ -3,6 +3,7 @@
 mod actions;
 pub mod compare;
 mod convert;
+mod convert_cloud;
 mod densify;
 mod diagnostics;
 mod estimate;
@@ -31,6 +32,7 @@ mod tower;
 
 pub use actions::{export_neighbors, export_roi, import_roi, is_project, is_readable};
 pub use convert::{ConvertJob, convert};
+pub use convert_cloud::{ConvertCloudJob, convert_cloud};
 pub use densify::{DEPTH_MAP, densify};
 pub use evaluate::{EvaluateJob, evaluate};
 pub use export::{ExportSceneJob, SceneExport, export_scene};

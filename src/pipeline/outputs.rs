@@ -125,8 +125,22 @@ pub(super) fn write_cloud(
     placement: Placement,
     progress: &Progress,
 ) -> Result<WrittenClouds> {
+    clouds(outputs, cloud, labels.map(Labels::table), placement, progress)
+}
+
+/// The same for labels that are classes of `table`.
+///
+/// # Errors
+/// A file cannot be written.
+pub(super) fn clouds(
+    outputs: &Outputs,
+    cloud: &dyn PointSource,
+    table: Option<&ClassTable>,
+    placement: Placement,
+    progress: &Progress,
+) -> Result<WrittenClouds> {
     let start = Instant::now();
-    let options = CloudOptions { placement, ..cloud_options(outputs, labels.map(Labels::table)) };
+    let options = CloudOptions { placement, ..cloud_options(outputs, table) };
     let written = write_clouds(cloud, &outputs.cloud, &options, progress)?;
     for file in &written.files {
         progress.event(Event::CloudSaved {
@@ -196,10 +210,10 @@ pub(super) fn summary(archive: &mvs::Scene, interface: bool) -> SceneSummary {
     }
 }
 
-/// The rows of a report about written clouds.
-pub(super) fn cloud_rows(written: &WrittenClouds, labels: Option<&Labels>) -> Vec<OutputReport> {
-    let content = |class: Option<ClassId>, label_colors: bool| match (class, labels) {
-        (Some(id), Some(labels)) => format!("dense cloud of class {}", labels.table().class_name(id)),
+/// The rows of a report about written clouds, whose classes are those of `table`.
+pub(super) fn cloud_rows(written: &WrittenClouds, table: Option<&ClassTable>) -> Vec<OutputReport> {
+    let content = |class: Option<ClassId>, label_colors: bool| match (class, table) {
+        (Some(id), Some(table)) => format!("dense cloud of class {}", table.class_name(id)),
         _ if label_colors => "dense cloud in class colours".to_owned(),
         _ => "dense cloud".to_owned(),
     };

@@ -1,8 +1,9 @@
 //! From the scene file to views that know their image, camera and neighbours.
 
 use super::images::Images;
-use super::job::SceneJob;
+use super::job::{Outputs, SceneJob};
 use super::masks::Masks;
+use super::outputs::check_places;
 use super::skip::Labels;
 use super::sparse::{override_from_file, replace_points};
 use super::tower::use_tower;
@@ -99,13 +100,14 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     Ok(loaded)
 }
 
-/// Checks masks and labels, decodes the images, and finds neighbours. `cameras` come from the images' headers; images whose
+/// Checks masks and labels and that `outputs` can be written, decodes the images, and finds neighbours. `cameras` come from the images' headers; images whose
 /// pixels turn out to be unusable are left out too, unless the job is strict.
 ///
 /// # Errors
 /// Fewer than two usable views, faulty labels, no way to find neighbours.
 pub(super) fn prepare(
     job: &SceneJob,
+    outputs: &Outputs,
     loaded: LoadedScene,
     mut cameras: Vec<Option<Camera>>,
     decode: bool,
@@ -116,6 +118,8 @@ pub(super) fn prepare(
     let labels = job.labels.as_ref().map(|l| Labels::open(l, &loaded, &cameras, progress)).transpose()?;
     let masks = job.masks.as_ref();
     let masks = masks.map(|m| Masks::find(m, &loaded, &cameras, labels.as_ref(), progress)).transpose()?;
+    // The classes of the table `ids` are known only now.
+    check_places(outputs, labels.as_ref().map(Labels::classes))?;
     let images = Images::new(&loaded, pixels_in_hand(job, &cameras) * size_of::<f32>());
     let mut dropped = header_drops(&loaded, &cameras);
     if decode {

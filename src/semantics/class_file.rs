@@ -134,6 +134,16 @@ impl Roster {
     }
 }
 
+/// The same classes, unless two have one id or one name.
+///
+/// # Errors
+/// What they share.
+pub(super) fn distinct(classes: Vec<Class>) -> std::result::Result<Vec<Class>, String> {
+    let mut roster = Roster::new(SharedColors::Allowed);
+    classes.into_iter().try_for_each(|class| roster.add(class, ()).map_err(|((), what)| what))?;
+    Ok(roster.classes)
+}
+
 /// A TOML text and the file it came from.
 #[derive(Clone, Copy)]
 struct Source<'a> {

@@ -123,6 +123,14 @@ impl ClassTable {
         class_file::parse_labels_json(text, path)
     }
 
+    /// The table `name` of `classes`, as a cloud lists them.
+    ///
+    /// # Errors
+    /// What two of them share: an id, a name.
+    pub fn listed(name: String, classes: Vec<Class>) -> std::result::Result<Self, String> {
+        class_file::distinct(classes).map(|classes| ClassTable::of(name, classes, None, Vec::new()))
+    }
+
     /// A table of checked parts.
     pub(super) fn of(
         name: String,

@@ -36,6 +36,17 @@ impl LoadedScene {
     }
 }
 
+/// Refuses a file in the place of the folder that names are relative to.
+///
+/// # Errors
+/// [`Error::Content`].
+pub(crate) fn check_working_folder(folder: &Path) -> Result<()> {
+    match folder.exists() && !folder.is_dir() {
+        true => Err(Error::content(folder, "this is a file; --working-folder (-w) takes a folder")),
+        false => Ok(()),
+    }
+}
+
 /// Loads the scene file at `path`. Names in it are relative to `working_folder` (empty = the current folder) or,
 /// failing that, to the folder of the file. A folder is taken for a COLMAP workspace; its images are its own.
 ///
@@ -52,6 +63,7 @@ pub fn load_scene(
     limits: &Limits,
     progress: &Progress,
 ) -> Result<LoadedScene> {
+    check_working_folder(working_folder)?;
     let workspace = path.is_dir().then(|| Workspace::at(path, None)).transpose()?;
     let (mut archive, container, search, trailing_bytes) = match &workspace {
         Some(workspace) => {

@@ -26,6 +26,7 @@ pub(crate) mod memory;
 pub(crate) mod packed;
 pub mod paths;
 mod ply_cloud;
+pub(crate) mod ply_source;
 pub mod rasters;
 pub mod spool;
 mod stale_clouds;

@@ -154,6 +154,141 @@ fn faulty_label_maps_are_found_before_work() {
     refused(&scratch, &format!("{SMALL} {one}"), &["one.toml"]);
 }
 
+/// Both programs refuse `options` before they look at any image; the line holds `needles`.
+#[track_caller]
+fn refused_at_once(scratch: &Scratch, options: &str, needles: &[&str]) {
+    refused(scratch, &format!("{SMALL} {options}"), needles);
+    let out = scratch.semvs(&format!("densify scene.mvs -o out/cloud.ply -w out {SMALL} {options}"));
+    assert!(
+        !out.stderr.contains("Images ready") && !out.stderr.contains("Preparing images"),
+        "{}",
+        out.stderr
+    );
+    let out = scratch.densify_point_cloud(&format!("scene.mvs -o dense {SMALL} {options}"));
+    assert!(!out.stdout.contains("Preparing images"), "{}", out.stdout);
+}
+
+#[test]
+fn faulty_class_tables_and_class_names_are_told_before_images() {
+    let scratch = Scratch::facade6();
+    let wall = "[[class]]\nid = 1\nname = \"building\"\ncolor = [0, 0, 255]\n";
+    for (more, needle) in [
+        ("[[class]]\nid = 1\nname = \"roof\"\n", "line 5: key class.id: 1 is taken by class 1"),
+        ("[[class]]\nid = 2\nname = \"Building\"\n", "line 5: key class.name: \"Building\" is taken"),
+        (
+            "[[class]]\nid = 2\nname = \"roof\"\ncolor = [0, 0, 255]\n",
+            "line 5: key class.color: [0, 0, 255] is taken",
+        ),
+        ("colour = [1, 2, 3]\n", "line 5: unknown key class.colour"),
+        ("[[class]]\nid = 65536\nname = \"roof\"\n", "line 6: key class.id: 65536 is not in 1..=65535"),
+        ("las = 256\n", "line 5: key class.las: 256 is not in 0..=255"),
+    ] {
+        scratch.write("t.toml", format!("{wall}{more}"));
+        refused_at_once(&scratch, "--label-path labels --class-table t.toml", &["t.toml", needle]);
+    }
+    let facade = "--label-path labels --class-table 3dom-facade";
+    for option in ["--classes", "--exclude-classes"] {
+        refused_at_once(
+            &scratch,
+            &format!("{facade} {option} widnow"),
+            &["widnow", "did you mean \"window\"?"],
+        );
+    }
+    refused_at_once(&scratch, "--label-path labels --class-table 3dom-facde", &["did you mean 3dom-facade?"]);
+    refused_at_once(
+        &scratch,
+        "--label-path images/0003.jpg --class-table ids",
+        &["0003.jpg", "--label-path"],
+    );
+}
+
+#[test]
+fn label_maps_for_no_view_at_all() {
+    let scratch = Scratch::facade6();
+    std::fs::create_dir(scratch.path("empty")).unwrap();
+    let needles = ["no image has a label map", "empty/0003_l.png"];
+    for missing in ["", "--missing-labels void"] {
+        let options = format!("--label-path empty --class-table 3dom-facade {missing}");
+        refused_at_once(&scratch, &options, &needles);
+    }
+}
+
+#[test]
+fn classes_without_a_las_code() {
+    let scratch = Scratch::facade6();
+    let facade = String::from("[[class]]\nid = 200\nname = \"building\"\ncolor = [0, 0, 255]\n");
+    scratch.write("t.toml", &facade);
+    let words = format!("{SMALL} --label-path labels --class-table t.toml --unknown-label void");
+    let needles = ["class 200 \"building\"", "64 + 200", "las = CODE"];
+    for name in ["x.las", "x.laz"] {
+        let out = scratch.semvs(&format!("densify scene.mvs -o {name} {words}")).fails_naming(&needles);
+        assert!(!out.stderr.contains("Scene read"), "{}", out.stderr);
+        scratch.densify_point_cloud(&format!("scene.mvs -o {name} {words}")).fails_naming(&needles);
+    }
+    // Of the table `ids` only the label maps tell which ids there are.
+    std::fs::create_dir(scratch.path("ids")).unwrap();
+    for name in ["0003", "0004", "0005", "0006", "0012", "0013"] {
+        let ids = image::ImageBuffer::from_pixel(400, 300, image::Luma([300u16]));
+        ids.save(scratch.path(&format!("ids/{name}.png"))).unwrap();
+    }
+    let words = format!("densify scene.mvs -o x.las {SMALL} --label-path ids --class-table ids");
+    let out = scratch.semvs(&words).fails_naming(&["class 300 \"class-300\""]);
+    assert!(!out.stderr.contains("Images ready"), "{}", out.stderr);
+    assert!(!scratch.files().iter().any(|f| f.ends_with(".dmap") || f.starts_with("x.")));
+}
+
+#[test]
+fn folders_in_the_place_of_class_clouds_and_files_in_that_of_folders() {
+    let scratch = Scratch::facade6();
+    let labels = "--label-path labels --class-table 3dom-facade --split-by-class";
+    for name in ["x.door.ply", "x.legend.png"] {
+        std::fs::create_dir(scratch.path(name)).unwrap();
+        let out =
+            scratch.semvs(&format!("densify scene.mvs -o x.ply {SMALL} {labels}")).fails_naming(&[name]);
+        assert!(!out.stderr.contains("Scene read"), "{}", out.stderr);
+        std::fs::remove_dir(scratch.path(name)).unwrap();
+    }
+    // Classes that only the label maps tell.
+    std::fs::create_dir(scratch.path("ids")).unwrap();
+    for name in ["0003", "0004", "0005", "0006", "0012", "0013"] {
+        image::GrayImage::from_pixel(400, 300, image::Luma([3]))
+            .save(scratch.path(&format!("ids/{name}.png")))
+            .unwrap();
+    }
+    std::fs::create_dir(scratch.path("x.class-3.ply")).unwrap();
+    let words =
+        format!("densify scene.mvs -o x.ply {SMALL} --label-path ids --class-table ids --split-by-class");
+    let out = scratch.semvs(&words).fails_naming(&["x.class-3.ply"]);
+    assert!(!out.stderr.contains("Images ready"), "{}", out.stderr);
+
+    scratch.add_maps("post7", "maps");
+    scratch.write("file", "");
+    for words in [
+        "densify scene.mvs -o y.ply -w file",
+        "fuse scene.mvs --depth-maps maps -o y.ply -w file",
+        "convert maps/depth0000.dmap -o y.ply -w file",
+    ] {
+        let out = scratch.semvs(words).fails_naming(&["file"]);
+        assert!(!out.stderr.contains("Images ready") && !out.stderr.contains("os error"), "{}", out.stderr);
+    }
+    let out = scratch.densify_point_cloud("scene.mvs -w file").fails_naming(&["file", "working folder (-w)"]);
+    assert!(!out.stderr.contains("os error"), "{}", out.stderr);
+}
+
+#[test]
+fn clouds_of_classes_that_are_no_more_are_named() {
+    let scratch = Scratch::with_maps();
+    let fuse = "fuse scene.mvs --depth-maps . -o x.laz --label-path labels --class-table 3dom-facade --split-by-class";
+    scratch.semvs(fuse).ok();
+    let out = scratch.semvs(&format!("{fuse} --classes building,window")).ok();
+    let line = out.stderr.lines().find(|line| line.contains("earlier run")).unwrap_or_default();
+    assert!(line.contains("x.door.laz") && line.contains("x.obstacle.laz"), "{}", out.stderr);
+    assert!(!line.contains("x.building.laz") && !line.contains("x.window.laz"), "{line}");
+    // A run without labels has none of them.
+    let out = scratch.semvs("fuse scene.mvs --depth-maps . -o x.laz").ok();
+    assert!(out.stderr.contains("x.building.laz"), "{}", out.stderr);
+}
+
 #[test]
 fn places_that_cannot_be_written() {
     let scratch = Scratch::facade6();

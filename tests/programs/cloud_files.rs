@@ -98,3 +98,59 @@ fn finished_clouds_are_written_as_las_too() {
     scratch.densify_point_cloud("dense.mvs -o few.laz --export-number-views 4").ok();
     assert!(las_points(&scratch.path("few_4views.laz")).len() > 100);
 }
+
+#[test]
+fn a_cloud_becomes_laz_and_the_classes_come_along() {
+    let scratch = Scratch::with_maps();
+    scratch.semvs(&format!("fuse scene.mvs --depth-maps . -o x.ply --ply-layout openmvs {LABELS}")).ok();
+    let ply = scratch.cloud("x.ply");
+    // By the classes that its header lists: they have names and colours, but no codes of their own.
+    scratch.semvs("convert x.ply -o y.laz --split-by-class --color-by-label --offset 100000,0,0").ok();
+    let laz = las_points(&scratch.path("y.laz"));
+    same_places(&laz, &ply.positions, [100_000.0, 0.0, 0.0]);
+    assert!(
+        laz.iter()
+            .zip(&ply.labels)
+            .all(|(p, &l)| u16::from(u8::from(p.classification)) == [1, 65, 66, 67, 68, 69][usize::from(l)])
+    );
+    assert!(scratch.has("y.building.laz") && scratch.has("y.labels.laz") && scratch.has("y.legend.png"));
+    // By a table, and not all of them.
+    scratch.semvs("convert x.ply -o z.las --class-table 3dom-facade --classes building,door").ok();
+    let las = las_points(&scratch.path("z.las"));
+    assert_eq!(las.len(), ply.labels.iter().filter(|&&label| label == 1 || label == 5).count());
+    assert!(las.iter().all(|p| [6, 69].contains(&u8::from(p.classification))));
+    // There and back with doubles.
+    scratch.semvs("convert x.ply -o d.ply --ply-doubles --offset 500000,5200000,0 --ply-layout openmvs").ok();
+    scratch
+        .semvs("convert d.ply -o e.ply --ply-doubles --offset -500000,-5200000,0 --ply-layout openmvs")
+        .ok();
+    let (d, e) = (scratch.cloud("d.ply"), scratch.cloud("e.ply"));
+    assert_eq!(d.positions_f64[7][0], f64::from(ply.positions[7][0]) + 500_000.0);
+    assert!(
+        ply.positions.iter().flatten().zip(e.positions.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-5)
+    );
+    assert_eq!((&e.views, &e.labels), (&ply.views, &ply.labels));
+    let out = scratch.semvs("convert d.ply -o f.ply").ok();
+    assert!(out.stderr.contains("--ply-doubles"), "{}", out.stderr);
+}
+
+#[test]
+fn what_cannot_be_converted_is_said() {
+    let scratch = Scratch::with_maps();
+    scratch.semvs("fuse scene.mvs --depth-maps . -o plain.ply").ok();
+    scratch.semvs(&format!("fuse scene.mvs --depth-maps . -o x.ply {LABELS}")).ok();
+    let fails = |words: &str, needles: &[&str]| {
+        drop(scratch.semvs(&format!("convert {words}")).fails_naming(needles))
+    };
+    fails("x.ply -o x.ply", &["x.ply", "this is the input"]);
+    fails("none.ply -o y.las", &["none.ply"]);
+    fails("plain.ply -o y.las --classes building", &["plain.ply", "no labels"]);
+    fails("plain.ply -o y.las --split-by-class", &["--split-by-class"]);
+    fails("x.ply -o y.las --classes bilding", &["bilding", "did you mean \"building\""]);
+    fails("x.ply -o y.las --class-table openmvs-aerial --classes 7", &["no point of it is wanted"]);
+    fails("x.ply -o y.las --label-path labels", &["--label-path"]);
+    fails("x.ply depth0000.dmap -o y.las", &["x.ply"]);
+    scratch.write("one.toml", "[[class]]\nid = 1\nname = \"building\"\n");
+    fails("x.ply -o y.las --class-table one.toml", &["x.ply", "label ", "class table one"]);
+    assert!(!scratch.has("y.las"));
+}

@@ -190,7 +190,7 @@ impl Header {
             if !source.line(&mut line, limits.max_string.min(MAX_HEADER), "header")? {
                 return Err(broken(offset, "header", "the file ends before the line \"end_header\""));
             }
-            if parser.line(&String::from_utf8_lossy(&line), offset)? {
+            if parser.line(&readable(&line), offset)? {
                 return parser.finish(source.offset());
             }
         }
@@ -286,9 +286,20 @@ fn scalar(name: &str, offset: u64) -> Result<ScalarType> {
         .ok_or_else(|| broken(offset, "property", format!("unknown type \"{}\"", excerpt(name))))
 }
 
-/// The start of `text`, short enough for a message.
+/// A header line as text; bytes that are no UTF-8 are spelled out, as `\xff`.
+fn readable(line: &[u8]) -> String {
+    let mut text = String::with_capacity(line.len());
+    for chunk in line.utf8_chunks() {
+        text += chunk.valid();
+        text += &chunk.invalid().escape_ascii().to_string();
+    }
+    text
+}
+
+/// The start of `text`, short enough for a message, without characters that a terminal would act on.
 fn excerpt(text: &str) -> String {
-    text.chars().take(60).flat_map(char::escape_debug).collect()
+    let shown = |c: char| if c == '\\' { vec![c] } else { c.escape_debug().collect() };
+    text.chars().take(60).flat_map(shown).collect()
 }
 
 pub(super) fn broken(offset: u64, field: impl Into<String>, what: impl Into<String>) -> Error {
@@ -314,6 +325,17 @@ mod tests {
         let list = PropertyType::List { count: ScalarType::U8, item: ScalarType::I32 };
         let expected = [PropertyType::Scalar(ScalarType::F32), PropertyType::Scalar(ScalarType::F64), list];
         assert_eq!(kinds, expected);
+    }
+
+    #[test]
+    fn bytes_that_cannot_be_shown_are_spelled_out() {
+        let error =
+            |bytes: &[u8]| Header::read(&mut Source::new(bytes), &Limits::default()).unwrap_err().to_string();
+        let message = error(b"ply\nformat ascii 1.0\n\xff\xfe\x1b[2J what\n");
+        assert!(message.starts_with(r#"line not understood: "\xff\xfe\u{1b}[2J what""#), "{message}");
+        let message = error(b"ply\nformat ascii 1.0\nelement vertex\x80 many\n");
+        assert!(message.contains(r"element vertex\x80"), "{message}");
+        assert!(message.chars().all(|c| !c.is_control() && c != char::REPLACEMENT_CHARACTER));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::cloud_path;
 use crate::cli::resolve;
 use crate::cli::semvs_args::ConvertArgs;
 use crate::error::{Error, Result};
-use crate::pipeline::{self, ConvertJob};
+use crate::pipeline::{self, ConvertCloudJob, ConvertJob};
 use crate::progress::Progress;
 use crate::store::cloud::PlyLayout;
 use std::path::Path;
@@ -20,6 +20,11 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
             "{option} has no meaning here: nothing is fused; use semvs fuse"
         )));
     }
+    if let [cloud] = args.depth_maps.as_slice()
+        && cloud.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"))
+    {
+        return convert_cloud(args, cloud, progress);
+    }
     let as_typed = |path: &Path| path.to_owned();
     let job = ConvertJob {
         depth_maps: args.depth_maps.clone(),
@@ -29,5 +34,24 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
         outputs: resolve::outputs(&args.clouds, cloud_path(&args.output)?, PlyLayout::Plain),
     };
     crate::cli::print(&pipeline::convert(&job, progress)?.summary());
+    Ok(())
+}
+
+fn convert_cloud(args: &ConvertArgs, cloud: &Path, progress: &Progress) -> Result<()> {
+    let asked = [
+        (args.labels.label_path.is_some(), "--label-path"),
+        (args.mask_path.is_some() || args.ignore_mask_label >= 0, "--mask-path, --ignore-mask-label"),
+        (args.working_folder.is_some(), "--working-folder"),
+    ];
+    if let Some((_, option)) = asked.iter().find(|(asked, _)| *asked) {
+        return Err(Error::invalid(format!("{option} has no meaning for a cloud, which has no images")));
+    }
+    let job = ConvertCloudJob {
+        cloud: cloud.to_owned(),
+        class_table: args.labels.class_table.clone(),
+        rules: resolve::rules(&args.labels),
+        outputs: resolve::outputs(&args.clouds, cloud_path(&args.output)?, PlyLayout::Plain),
+    };
+    crate::cli::print(&pipeline::convert_cloud(&job, progress)?.summary());
     Ok(())
 }

@@ -39,6 +39,9 @@ pub(crate) fn read(words: &[OsString]) -> Result<Typing, String> {
     let mut typed = tokens::split(words, &known, "input-file")?;
     let value = |name: &str| typed.iter().find(|(n, _)| n == name).and_then(|(_, v)| v.as_deref());
     let folder = value("working-folder").map(|v| openmvs_path(Path::new(v))).unwrap_or_default();
+    if folder.exists() && !folder.is_dir() {
+        return Err(format!("{}: the working folder (-w) is a file here; give a folder", folder.display()));
+    }
     let config = value("config-file").unwrap_or(OsStr::new("DensifyPointCloud.cfg"));
     let config = under(&folder, &openmvs_path(Path::new(config)));
     for (name, value) in config_file::read(&config, &known)? {
