@@ -1,6 +1,6 @@
 //! The cross-view filter of OpenMVS, in its two variants: adjust (default) and strict.
 
-use super::warp::{WarpedPixel, warp_into};
+use super::warp::{Seen, Warped};
 use super::{DepthFilterOptions, FilterView};
 use crate::geometry::{Camera, is_similar_depth};
 use crate::scene::{DepthEstimate, Grid};
@@ -84,34 +84,33 @@ fn adjust(
             }
         })
         .collect();
-    let mut warped = Grid::filled(estimate.depth.size(), WarpedPixel::EMPTY);
+    let mut warped = Warped::new(estimate.depth.size());
     for (k, neighbor) in neighbors.iter().enumerate().rev() {
-        warped.data_mut().fill(WarpedPixel::EMPTY);
-        warp_into(&mut warped, reference, neighbor);
-        for y in 0..estimate.depth.height() {
-            let row = y * estimate.depth.width();
-            for x in 0..estimate.depth.width() {
-                let i = row + x;
-                let depth = estimate.depth.data()[i];
-                let verdict = &mut verdicts[i];
+        warped.fill(reference, neighbor);
+        let confidences = neighbor.estimate.confidence.as_ref().map(|map| map.data());
+        let rows = verdicts.chunks_mut(estimate.depth.width().max(1));
+        for (y, verdicts) in rows.enumerate() {
+            let pixels = verdicts.iter_mut().zip(estimate.depth.row(y)).zip(warped.row(y));
+            for (x, ((verdict, &depth), seen)) in pixels.enumerate() {
                 if depth == 0.0 || verdict.discarded {
                     continue;
                 }
-                let seen = warped.data()[i];
-                if seen.depth == 0.0 {
+                let Some(Seen { depth: seen_depth, pixel }) = seen else {
                     let judged = u32::from(verdict.agreeing) + u32::from(verdict.contradicting);
                     verdict.discarded = judged + (k as u32) < min_views;
-                } else if is_similar_depth(depth, seen.depth, max_diff) {
-                    verdict.weighted_depth += seen.depth * seen.confidence;
-                    verdict.support += seen.confidence;
+                    continue;
+                };
+                let confidence = confidences.map_or(1.0, |c| c[pixel]);
+                if is_similar_depth(depth, seen_depth, max_diff) {
+                    verdict.weighted_depth += seen_depth * confidence;
+                    verdict.support += confidence;
                     verdict.agreeing += 1;
                 } else {
                     verdict.contradicting += 1;
-                    verdict.contradiction += if depth > seen.depth {
-                        seen.confidence
+                    verdict.contradiction += if depth > seen_depth {
+                        confidence
                     } else {
-                        seen_through(&estimate.camera, neighbor.estimate, x, y, depth)
-                            .unwrap_or(seen.confidence)
+                        seen_through(&estimate.camera, neighbor.estimate, x, y, depth).unwrap_or(confidence)
                     };
                 }
             }
@@ -187,10 +186,9 @@ fn strict(
     let estimate = reference.estimate;
     let (max_diff, max_diff_around) = (threshold * STRICT_FACTOR, threshold * STRICT_AROUND_FACTOR);
     let mut tallies = vec![Tally::default(); estimate.depth.data().len()];
-    let mut warped = Grid::filled(estimate.depth.size(), WarpedPixel::EMPTY);
+    let mut warped = Warped::new(estimate.depth.size());
     for neighbor in neighbors {
-        warped.data_mut().fill(WarpedPixel::EMPTY);
-        warp_into(&mut warped, reference, neighbor);
+        warped.fill(reference, neighbor);
         for y in 0..estimate.depth.height() {
             for x in 0..estimate.depth.width() {
                 let depth = estimate.depth[(x, y)];
@@ -198,13 +196,12 @@ fn strict(
                     continue;
                 }
                 let tally = &mut tallies[estimate.depth.index(x, y)];
-                let here = warped[(x, y)].depth;
-                if here > 0.0 {
+                if let Some(here) = warped.get(x, y) {
                     tally.seen += 1;
-                    tally.similar += u8::from(is_similar_depth(depth, here, max_diff));
+                    tally.similar += u8::from(is_similar_depth(depth, here.depth, max_diff));
                 }
                 let around = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
-                for near in around.iter().filter_map(|&(x, y)| warped.get(x, y)).filter(|w| w.depth > 0.0) {
+                for near in around.iter().filter_map(|&(x, y)| warped.get(x, y)) {
                     tally.seen_around += 1;
                     tally.similar_around += u8::from(is_similar_depth(depth, near.depth, max_diff_around));
                 }
