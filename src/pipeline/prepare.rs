@@ -16,6 +16,7 @@ use crate::scene::{
     virtual_points,
 };
 use crate::store::import::{LoadedScene, load_scene};
+use nalgebra::Vector3;
 use semvs_formats::Limits;
 use semvs_formats::mvs::Container;
 use std::collections::BTreeSet;
@@ -78,6 +79,7 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     if let Some(path) = &job.pointcloud_file {
         replace_points(&mut loaded, path)?;
     }
+    warn_of_coarse_coordinates(&loaded, progress);
     let scene = &mut loaded.scene;
     progress.event(Event::SceneLoaded {
         scene: SceneSummary {
@@ -98,6 +100,29 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
         override_from_file(&mut loaded.scene, path, progress)?;
     }
     Ok(loaded)
+}
+
+/// Says when the cameras are so far from the origin that points, which have 32-bit coordinates, cannot be exact there.
+fn warn_of_coarse_coordinates(loaded: &LoadedScene, progress: &Progress) {
+    /// Coarsest step between neighbouring coordinates that does no harm, as a share of the cameras' extent.
+    const COARSEST: f64 = 1e-5;
+    let centers: Vec<Vector3<f64>> =
+        loaded.scene.views.iter().filter_map(|v| v.calibration.as_ref()).map(|c| c.center).collect();
+    let Some(&first) = centers.first() else { return };
+    let (low, high) = centers.iter().fold((first, first), |(low, high), c| (low.inf(c), high.sup(c)));
+    let step = low.amax().max(high.amax()) * f64::from(f32::EPSILON);
+    if step > COARSEST * (high - low).amax() {
+        let shift = low.map(f64::floor);
+        let digits = (1.0 - step.log10().floor()).max(0.0) as usize;
+        progress.warn(format!(
+            "{}: so far from the origin 32-bit coordinates are about {step:.digits$} apart, and clouds show stripes; shift the \
+             scene to its cameras and give --offset {},{},{} with .las, .laz or --ply-doubles",
+            loaded.path.display(),
+            shift.x,
+            shift.y,
+            shift.z
+        ));
+    }
 }
 
 /// Checks masks and labels and that `outputs` can be written, decodes the images, and finds neighbours. `cameras` come from the images' headers; images whose

@@ -32,7 +32,7 @@ pub(super) struct Output<'a> {
 }
 
 enum Format {
-    Ply(PlyOutput),
+    Ply(Box<PlyOutput>),
     Las(Box<LasOutput>),
 }
 
@@ -43,7 +43,7 @@ impl<'a> Output<'a> {
     /// It cannot be written.
     pub(super) fn create(job: &Job, options: &CloudOptions<'a>) -> Result<Self> {
         let file = match &job.columns {
-            Columns::Ply(layout) => Format::Ply(PlyOutput::create(&job.file, layout)?),
+            Columns::Ply(layout) => Format::Ply(Box::new(PlyOutput::create(&job.file, layout)?)),
             Columns::Las(columns) => Format::Las(Box::new(LasOutput::create(&job.file, columns)?)),
         };
         let colors = options.table.filter(|_| job.file.label_colors);

@@ -154,3 +154,20 @@ fn what_cannot_be_converted_is_said() {
     fails("x.ply -o y.las --class-table one.toml", &["x.ply", "label ", "class table one"]);
     assert!(!scratch.has("y.las"));
 }
+
+#[test]
+fn scenes_that_stand_at_utm_coordinates_are_told_of() {
+    let scratch = Scratch::with_maps();
+    let fuse = "fuse scene.mvs --depth-maps . -o x.las";
+    assert!(!scratch.semvs(fuse).ok().stderr.contains("stripes"));
+    let mut scene = mvs::read(scratch.path("scene.mvs"), &Limits::default()).unwrap();
+    for pose in scene.platforms.iter_mut().flat_map(|platform| &mut platform.poses) {
+        pose.center[0] += 500_000.0;
+        pose.center[1] += 5_200_000.0;
+    }
+    let mut bytes = Vec::new();
+    mvs::write_interface(&mut bytes, &scene, mvs::NEWEST_VERSION).unwrap();
+    scratch.write("scene.mvs", bytes);
+    let stderr = scratch.semvs(fuse).stderr;
+    assert!(stderr.contains("are about 0.62 apart") && stderr.contains("--offset 499"), "{stderr}");
+}
