@@ -104,6 +104,7 @@ fn a_cloud_becomes_laz_and_the_classes_come_along() {
     let scratch = Scratch::with_maps();
     scratch.semvs(&format!("fuse scene.mvs --depth-maps . -o x.ply --ply-layout openmvs {LABELS}")).ok();
     let ply = scratch.cloud("x.ply");
+    assert!(scratch.semvs("inspect x.laz").code == Some(1));
     // By the classes that its header lists: they have names and colours, but no codes of their own.
     scratch.semvs("convert x.ply -o y.laz --split-by-class --color-by-label --offset 100000,0,0").ok();
     let laz = las_points(&scratch.path("y.laz"));
@@ -114,6 +115,13 @@ fn a_cloud_becomes_laz_and_the_classes_come_along() {
             .all(|(p, &l)| u16::from(u8::from(p.classification)) == [1, 65, 66, 67, 68, 69][usize::from(l)])
     );
     assert!(scratch.has("y.building.laz") && scratch.has("y.labels.laz") && scratch.has("y.legend.png"));
+    let shown = scratch.semvs("inspect y.laz").ok().stdout;
+    for line in [&format!("points: {}", laz.len()), "compressed: yes", "version: 1.4", "  65: building"] {
+        assert!(shown.lines().any(|l| l == line), "{line}\n{shown}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&scratch.semvs("inspect y.laz --json").ok().stdout).unwrap();
+    assert_eq!((&json["kind"], &json["extra_bytes"][3]), (&"las-cloud".into(), &"uint16 label".into()));
     // By a table, and not all of them.
     scratch.semvs("convert x.ply -o z.las --class-table 3dom-facade --classes building,door").ok();
     let las = las_points(&scratch.path("z.las"));

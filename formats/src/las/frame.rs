@@ -83,7 +83,8 @@ mod tests {
     #[test]
     fn small_clouds_get_finer_and_large_ones_coarser_steps() {
         assert_eq!(frame(0.0, 1.0).scale, 1e-5);
-        assert_eq!(frame(1.5, 1.501).scale, 1e-9);
+        assert_eq!(frame(1.5, 1.501).scale, 1e-8);
+        assert_eq!(frame(1.5, 1.500_001).scale, 1e-9);
         assert_eq!(frame(5.0, 5.0).scale, 1e-4);
         assert_eq!(frame(0.0, 1e6).scale, 1e-3);
         assert_eq!(frame(-1e10, 1e10).scale, 1e1);

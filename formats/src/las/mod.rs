@@ -1,4 +1,4 @@
-//! LAS 1.4 point clouds and their compressed form, LAZ: streaming write.
+//! LAS 1.4 point clouds and their compressed form, LAZ: streaming write, and what a file says of itself.
 //!
 //! Points are written in record format 6, with colours in format 7; what the format has no place for goes into extra
 //! bytes that a record in the header declares. The same points give the same bytes: no date, no random identifier.
@@ -19,10 +19,12 @@
 
 mod frame;
 mod header;
+mod info;
 #[cfg(test)]
 mod tests;
 mod write;
 
 pub use frame::Frame;
 pub use header::{Extra, Header, Layout};
+pub use info::LasInfo;
 pub use write::{LasPoint, LasWriter};

@@ -1,6 +1,7 @@
 //! Files that a reader of others' making understands.
 
 use super::*;
+use crate::Limits;
 use std::io::Cursor;
 
 /// `n` points whose attributes all differ, about UTM coordinates.
@@ -134,4 +135,50 @@ fn miscounted_and_far_points_are_errors() {
     assert!(writer.finish().err().unwrap().to_string().contains("fewer points"));
     let far = LasPoint { position: [1e9; 3], ..LasPoint::default() };
     assert!(open().write(&[far]).unwrap_err().to_string().contains("1000000000"));
+}
+
+#[test]
+fn the_header_is_read_back() {
+    let points = points(9);
+    for compressed in [false, true] {
+        let info =
+            LasInfo::read(written(&points, &everything(compressed)).as_slice(), &Limits::default()).unwrap();
+        assert_eq!((info.version, info.format, info.compressed, info.points), ((1, 4), 7, compressed, 9));
+        assert_eq!((info.scale, info.offset[0]), ([1e-5; 3], 500_000.0));
+        assert_eq!((info.bounds[0][1], info.bounds[1][1]), (5_199_992.0, 5_200_000.0));
+        assert_eq!(info.extras[0], "float32 NormalX");
+        assert_eq!(info.extras[3..5], ["uint16 label", "float32 label_confidence"]);
+        assert_eq!(info.class_names, [(6, "building".to_owned()), (68, "a name of more ".to_owned())]);
+        assert_eq!(info.software, "semvs");
+    }
+    // A file of another's making and an older version.
+    let mut writer = las::Writer::new(Cursor::new(Vec::new()), las::Header::from((1, 2))).unwrap();
+    writer.write_point(las::Point { x: 1.5, ..las::Point::default() }).unwrap();
+    let bytes = writer.into_inner().unwrap().into_inner();
+    let info = LasInfo::read(bytes.as_slice(), &Limits::default()).unwrap();
+    assert_eq!((info.version, info.format, info.points, info.bounds[1][0]), ((1, 2), 0, 1, 1.5));
+}
+
+#[test]
+fn broken_headers_are_refused() {
+    let whole = written(&points(3), &everything(false));
+    let to_points = whole.len() - 3 * 60;
+    for end in 0..to_points {
+        assert!(LasInfo::read(&whole[..end], &Limits::default()).is_err(), "{end}");
+    }
+    assert!(LasInfo::read(&whole[..to_points], &Limits::default()).is_ok());
+    let changed = |at: usize, values: &[u8]| {
+        let mut bytes = whole.clone();
+        bytes[at..at + values.len()].copy_from_slice(values);
+        LasInfo::read(bytes.as_slice(), &Limits::default()).unwrap_err().to_string()
+    };
+    assert!(changed(0, b"PLYF").contains("LASF"));
+    assert!(changed(94, &[100, 0]).contains("header size"));
+    assert!(changed(100, &[255; 4]).contains("variable length records"));
+    assert!(changed(96, &[0; 4]).contains("reaches into the points"));
+    for at in 0..to_points {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0xff;
+        let _ = LasInfo::read(bytes.as_slice(), &Limits::default());
+    }
 }

@@ -2,12 +2,14 @@
 
 mod cloud;
 mod depth_map;
+mod las;
 mod picture;
 mod scene;
 mod values;
 
 pub use cloud::CloudFacts;
 pub use depth_map::DepthMapFacts;
+pub use las::LasFacts;
 pub use picture::{ClassFacts, ClassTableFacts, ColorShare, IdShare, PictureFacts};
 pub use scene::{CameraFacts, ImageFacts, PointFacts, RoiFacts, SceneFacts};
 pub use values::{Bounds, Range};
@@ -28,6 +30,8 @@ pub enum Inspection {
     DepthMap(DepthMapFacts),
     /// `.ply`
     Cloud(CloudFacts),
+    /// `.las`, `.laz`
+    LasCloud(LasFacts),
     /// A photograph.
     Image(PictureFacts),
     /// A PNG of few colours or values: label maps and masks look so.
@@ -49,10 +53,12 @@ pub fn inspect(path: &Path) -> Result<Inspection> {
         [b'M', b'V', b'S', b'I' | 0, ..] => scene::inspect(path).map(Inspection::Scene),
         [b'D', b'R' | b'2', ..] => depth_map::inspect(path).map(Inspection::DepthMap),
         [b'p', b'l', b'y', b'\n' | b'\r', ..] => cloud::inspect(path).map(Inspection::Cloud),
+        [b'L', b'A', b'S', b'F', ..] => las::inspect(path).map(Inspection::LasCloud),
         _ => match extension.as_str() {
             "mvs" => scene::inspect(path).map(Inspection::Scene),
             "dmap" => depth_map::inspect(path).map(Inspection::DepthMap),
             "ply" => cloud::inspect(path).map(Inspection::Cloud),
+            "las" | "laz" => las::inspect(path).map(Inspection::LasCloud),
             "toml" => picture::inspect_table(path).map(Inspection::ClassTable),
             "png" | "jpg" | "jpeg" | "tif" | "tiff" | "bmp" | "pgm" | "ppm" | "pnm" => picture::inspect(path)
                 .map(|facts| match facts.is_label_map() {
@@ -61,8 +67,8 @@ pub fn inspect(path: &Path) -> Result<Inspection> {
                 }),
             _ => Err(Error::content(
                 path,
-                "not a kind of file known here: scene (.mvs), depth map (.dmap), cloud (.ply), image, class table \
-                 (.toml)",
+                "not a kind of file known here: scene (.mvs), depth map (.dmap), cloud (.ply, .las, .laz), image, class \
+                 table (.toml)",
             )),
         },
     }
