@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench stages`; whole programs are compared by `benches/compare.sh`.
 
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 mod busy;
 mod codecs;

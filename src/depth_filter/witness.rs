@@ -165,7 +165,7 @@ impl RowScratch {
         {
             let along = |x: f32, y: f32| nx * x + ny * y + nz;
             let ratio = along(*center_x, *center_y) / along(*x, *y);
-            let believed = (ratio >= 1.0 / MAX_PLANE_CORRECTION) & (ratio < MAX_PLANE_CORRECTION);
+            let believed = (1.0 / MAX_PLANE_CORRECTION..MAX_PLANE_CORRECTION).contains(&ratio);
             let ratio = if believed { ratio } else { 1.0 };
             *difference = (seen * ratio - z) / z;
         }
