@@ -179,3 +179,52 @@ fn scenes_that_stand_at_utm_coordinates_are_told_of() {
     let stderr = scratch.semvs(fuse).stderr;
     assert!(stderr.contains("are about 0.62 apart") && stderr.contains("--offset 499"), "{stderr}");
 }
+
+/// Ids of `ade20k` for those of `3dom-facade`.
+const ADE20K: [u16; 6] = [0, 1, 40, 80, 120, 150];
+
+#[test]
+fn a_table_of_150_classes_and_ids_of_two_bytes_change_no_point() {
+    let scratch = Scratch::with_maps();
+    let colors = [[0, 0, 0], [0, 0, 255], [255, 255, 0], [255, 0, 0], [0, 255, 0], [255, 0, 255]];
+    for folder in ["ade", "wide"] {
+        std::fs::create_dir(scratch.path(folder)).unwrap();
+    }
+    let mut wide = String::new();
+    ADE20K[1..]
+        .iter()
+        .for_each(|id| wide += &format!("[[class]]\nid = {}\nname = \"c{id}\"\nlas = {id}\n", 1000 + id));
+    scratch.write("wide.toml", wide);
+    for name in ["0003", "0004", "0005", "0006", "0012", "0013"] {
+        let labels = image::open(scratch.path(&format!("labels/{name}_l.png"))).unwrap().to_rgb8();
+        let id = |x, y| ADE20K[colors.iter().position(|c| *c == labels.get_pixel(x, y).0).unwrap()];
+        let (width, height) = labels.dimensions();
+        let ids = image::ImageBuffer::from_fn(width, height, |x, y| image::Luma([id(x, y)]));
+        ids.save(scratch.path(&format!("ade/{name}.png"))).unwrap();
+        let ids = image::ImageBuffer::from_fn(width, height, |x, y| {
+            image::Luma([id(x, y) + 1000 * id(x, y).min(1)])
+        });
+        ids.save(scratch.path(&format!("wide/{name}.png"))).unwrap();
+    }
+    let fuse = |name: &str, words: &str| {
+        scratch.semvs(&format!("fuse scene.mvs --depth-maps . -o {name} {words}")).ok();
+    };
+    fuse("five.ply", LABELS);
+    fuse("ade.ply", "--label-path ade --class-table ade20k");
+    fuse("ade.laz", "--label-path ade --class-table ade20k");
+    fuse("wide.ply", "--label-path wide --class-table wide.toml");
+    fuse("wide.las", "--label-path wide --class-table wide.toml");
+    let [five, ade, wide] = ["five.ply", "ade.ply", "wide.ply"].map(|name| scratch.cloud(name));
+    assert_eq!((&five.positions, &five.positions), (&ade.positions, &wide.positions));
+    for (i, &label) in five.labels.iter().enumerate() {
+        let id = ADE20K[usize::from(label)];
+        assert_eq!((ade.labels[i], wide.labels[i]), (id, if id > 0 { 1000 + id } else { 0 }));
+    }
+    let codes = |name: &str| -> Vec<u16> {
+        las_points(&scratch.path(name)).iter().map(|p| u8::from(p.classification).into()).collect()
+    };
+    assert!(
+        codes("ade.laz").iter().zip(&ade.labels).all(|(code, id)| *code == if *id > 0 { 64 + id } else { 1 })
+    );
+    assert!(codes("wide.las").iter().zip(&ade.labels).all(|(code, id)| code == id.max(&1)));
+}

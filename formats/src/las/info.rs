@@ -34,6 +34,8 @@ const COMMON: usize = 227;
 const RECORD_HEADER: usize = 54;
 /// Most records that are looked at.
 const MOST_RECORDS: u32 = 1 << 16;
+/// Classification codes that there are.
+const MOST_CODES: usize = 256;
 /// Types of extra bytes by their codes.
 const TYPES: [&str; 11] =
     ["bytes", "uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64"];
@@ -106,7 +108,8 @@ impl LasInfo {
                 ("LASF_Spec", 0) => {
                     let named =
                         |entry: &[u8]| Some((entry[0], text(&entry[1..]))).filter(|(_, n)| !n.is_empty());
-                    self.class_names.extend(data.chunks_exact(16).filter_map(named));
+                    let room = MOST_CODES.saturating_sub(self.class_names.len());
+                    self.class_names.extend(data.chunks_exact(16).filter_map(named).take(room));
                 }
                 ("LASF_Spec", 4) => {
                     let kind = |code: u8| TYPES.get(usize::from(code)).copied().unwrap_or("values");

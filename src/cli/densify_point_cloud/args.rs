@@ -30,7 +30,8 @@ pub(crate) struct DropInArgs {
     /// Scene (.mvs)
     #[arg(short, long, value_name = "FILE")]
     pub(crate) input_file: Option<PathBuf>,
-    /// Base name of the results; its extension is dropped [default: input file + "_dense"]
+    /// Base name of the results; its extension is dropped, but .las and .laz say what the cloud is written as [default:
+    /// input file + "_dense"]
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output_file: Option<PathBuf>,
     /// Keep what OpenMVS does wrong where a pipeline may depend on it; docs/COMPATIBILITY.md lists it
