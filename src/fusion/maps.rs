@@ -17,12 +17,14 @@ pub struct FusionMaps {
     /// Classes as the consistency check sees them, where they differ from `labels`: bands along class borders
     /// are void here. Votes are always taken from `labels`.
     pub checked_labels: Option<Arc<LabelMap>>,
+    /// How certain `labels` are, 0..1; `None`: wholly.
+    pub label_confidence: Option<Arc<Grid<f32>>>,
 }
 
 impl FusionMaps {
     /// Maps without colour and labels.
     pub fn new(estimate: Arc<DepthEstimate>) -> Self {
-        FusionMaps { estimate, color: None, labels: None, checked_labels: None }
+        FusionMaps { estimate, color: None, labels: None, checked_labels: None, label_confidence: None }
     }
 
     /// Size of the maps.

@@ -136,9 +136,9 @@ impl<'a> Merger<'a> {
         }
         let pixel = |m: &Member| (&views[m.view as usize], m.pixel as usize);
         self.vote.clear();
-        self.vote.support(views[0].label(own as usize), views[0].pixels[own as usize].weight);
-        for (view, pixel) in members.iter().map(pixel) {
-            self.vote.support(view.label(pixel), view.pixels[pixel].weight);
+        let own_pixel = std::iter::once((&views[0], own as usize));
+        for (view, pixel) in own_pixel.chain(members.iter().map(pixel)) {
+            self.vote.support_partly(view.label(pixel), view.pixels[pixel].weight, view.certainty(pixel));
         }
         for (view, pixel) in self.dissenters.iter().map(pixel) {
             self.vote.dissent(view.label(pixel), view.pixels[pixel].weight);

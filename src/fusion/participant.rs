@@ -3,7 +3,7 @@
 
 use super::FusionMaps;
 use crate::geometry::Lens;
-use crate::scene::{ColorImage, DepthEstimate, LabelMap, ViewIndex};
+use crate::scene::{ColorImage, DepthEstimate, Grid, LabelMap, ViewIndex};
 use std::sync::Arc;
 
 /// A pixel as the passes read it, all in one place: they are bound by memory.
@@ -29,6 +29,7 @@ pub(super) struct ViewPixels {
     color: Option<Arc<ColorImage>>,
     labels: Option<Arc<LabelMap>>,
     checked_labels: Option<Arc<LabelMap>>,
+    label_confidence: Option<Arc<Grid<f32>>>,
 }
 
 /// Normal of all pixels where there are no normals: they count as facing the same way.
@@ -37,7 +38,7 @@ const FACING: [f32; 3] = [0.0, 0.0, -1.0];
 impl ViewPixels {
     /// Takes over `maps`. `use_normals` is false where any map lacks them.
     pub(super) fn new(maps: FusionMaps, use_normals: bool) -> Self {
-        let FusionMaps { estimate, color, labels, checked_labels } = maps;
+        let FusionMaps { estimate, color, labels, checked_labels, label_confidence } = maps;
         let DepthEstimate { image_name: name, camera, depth, normal, confidence, .. } = &*estimate;
         let name = name.clone();
         let (lens, size) = (Lens::new(camera), depth.size());
@@ -51,7 +52,18 @@ impl ViewPixels {
         let pixels = depth.data().iter().enumerate().map(pixel).collect();
         let has_normals = normal.is_some();
         let (width, height) = (size.width, size.height);
-        ViewPixels { name, lens, width, height, pixels, has_normals, color, labels, checked_labels }
+        ViewPixels {
+            name,
+            lens,
+            width,
+            height,
+            pixels,
+            has_normals,
+            color,
+            labels,
+            checked_labels,
+            label_confidence,
+        }
     }
 
     /// Bytes that the maps hold in memory.
@@ -61,7 +73,8 @@ impl ViewPixels {
             * (size_of::<Pixel>() as u64
                 + has(self.color.is_some(), 3)
                 + has(self.labels.is_some(), 2)
-                + has(self.checked_labels.is_some(), 2))
+                + has(self.checked_labels.is_some(), 2)
+                + has(self.label_confidence.is_some(), 4))
     }
 
     /// Whether there is an image to take colours from.
@@ -94,6 +107,7 @@ pub(super) struct Participant<'a> {
     pub(super) color: Option<&'a [[u8; 3]]>,
     labels: Option<&'a [u16]>,
     checked_labels: Option<&'a [u16]>,
+    certainty: Option<&'a [f32]>,
 }
 
 impl<'a> Participant<'a> {
@@ -109,6 +123,7 @@ impl<'a> Participant<'a> {
             color: pixels.color.as_deref().map(|c| c.data()),
             labels,
             checked_labels: pixels.checked_labels.as_ref().map(|labels| labels.data()).or(labels),
+            certainty: pixels.label_confidence.as_ref().map(|map| map.data()),
         }
     }
 
@@ -116,6 +131,12 @@ impl<'a> Participant<'a> {
     #[inline]
     pub(super) fn point(&self, pixel: u32) -> [f64; 3] {
         self.lens.world_point(pixel % self.width, pixel / self.width, self.pixels[pixel as usize].depth)
+    }
+
+    /// How certain the class of a pixel is, 0..1.
+    #[inline]
+    pub(super) fn certainty(&self, pixel: usize) -> f32 {
+        self.certainty.map_or(1.0, |c| c[pixel])
     }
 
     /// Class of a pixel, 0 without labels.

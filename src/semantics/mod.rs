@@ -5,12 +5,14 @@
 
 mod class_file;
 mod classes;
+mod consensus;
 mod label_map;
 mod names;
 mod policy;
 mod vote;
 
 pub use classes::{Class, ClassId, ClassTable};
+pub use consensus::{Consensus, ConsensusOptions, Witness, border_distance, label_consensus};
 pub use label_map::{nearest_labels, void_borders};
 pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency};
 pub use vote::{LabelVote, Vote};

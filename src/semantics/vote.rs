@@ -18,6 +18,7 @@ pub struct LabelVote {
 pub struct Vote {
     weights: Vec<(ClassId, f64)>,
     dissent: f64,
+    doubt: f64,
 }
 
 impl Vote {
@@ -25,14 +26,23 @@ impl Vote {
     pub fn clear(&mut self) {
         self.weights.clear();
         self.dissent = 0.0;
+        self.doubt = 0.0;
     }
 
     /// Counts a pixel that is merged into the point, the reference pixel included, with its fusion weight (> 0).
     pub fn support(&mut self, label: impl Into<ClassId>, weight: f32) {
+        self.support_partly(label, weight, 1.0);
+    }
+
+    /// The same for a pixel whose label is certain to the degree of `certainty`, 0..1: the rest of its weight speaks for
+    /// no class and lowers the confidence.
+    pub fn support_partly(&mut self, label: impl Into<ClassId>, weight: f32, certainty: f32) {
         let label = label.into();
         if label.is_void() {
             return;
         }
+        self.doubt += f64::from(weight * (1.0 - certainty));
+        let weight = weight * certainty;
         match self.weights.iter_mut().find(|(id, _)| *id == label) {
             Some((_, sum)) => *sum += f64::from(weight),
             None => self.weights.push((label, f64::from(weight))),
@@ -50,7 +60,7 @@ impl Vote {
     pub fn outcome(&self, reference: impl Into<ClassId>) -> LabelVote {
         let reference = reference.into();
         let rank = |id: ClassId| (id != reference, id);
-        let mut total = self.dissent;
+        let mut total = self.dissent + self.doubt;
         let mut best: Option<(ClassId, f64)> = None;
         for &(id, weight) in &self.weights {
             total += weight;
@@ -101,6 +111,18 @@ mod tests {
         vote.dissent(2, 3.0);
         vote.dissent(0, 50.0);
         assert_eq!(vote.outcome(1), LabelVote { label: ClassId(1), confidence: 0.25 });
+    }
+
+    #[test]
+    fn doubtful_labels_have_less_weight_and_less_confidence() {
+        let mut vote = Vote::default();
+        vote.support_partly(1, 2.0, 0.25);
+        vote.support_partly(2, 1.0, 0.75);
+        vote.support_partly(0, 9.0, 0.5);
+        assert_eq!(vote.outcome(1), LabelVote { label: ClassId(2), confidence: 0.25 });
+        vote.clear();
+        vote.support_partly(1, 2.0, 0.5);
+        assert_eq!(vote.outcome(1), LabelVote { label: ClassId(1), confidence: 0.5 });
     }
 
     #[test]
