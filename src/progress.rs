@@ -27,6 +27,8 @@ pub enum Stage {
     Fuse,
     /// Plain merge of all depths; one step per view.
     Merge,
+    /// Label maps are made from a cloud; one step per view.
+    RenderLabels,
 }
 
 /// What a scene file holds.

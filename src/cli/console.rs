@@ -123,6 +123,7 @@ fn name(stage: Stage) -> String {
         Stage::Filter => "Filtering depth maps".into(),
         Stage::Fuse => "Fusing depth maps".into(),
         Stage::Merge => "Merging depth maps".into(),
+        Stage::RenderLabels => "Rendering label maps".into(),
     }
 }
 

@@ -27,6 +27,15 @@ pub(crate) struct LabelInput {
     /// Width in pixels of the band along class borders whose labels decide nothing
     #[arg(long, value_name = "PIXELS", default_value_t = 0)]
     pub(crate) label_border: u32,
+    /// Whose labels a point's label is voted from [default: all, when there are labels]
+    #[arg(long, value_name = "WHOSE", value_enum)]
+    pub(crate) label_votes: Option<VotersMode>,
+    /// Let the K nearest points on the same surface vote on the label of each point once more; 0 = no
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub(crate) label_smooth: u32,
+    /// Whether the filter across views compares pixels of one class only
+    #[arg(long, value_name = "WHETHER", value_enum, default_value_t = OnOff::Off)]
+    pub(crate) label_filter: OnOff,
     /// A view without a label map
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = WhenMissing::Error)]
     pub(crate) missing_labels: WhenMissing,
@@ -90,6 +99,24 @@ pub(crate) enum ConsistencyMode {
     Support,
     /// a pixel of another class rejects the point
     Strict,
+}
+
+/// `--label-votes`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum VotersMode {
+    /// of all views that see the surface
+    All,
+    /// of the pixels merged into the point
+    Merged,
+}
+
+/// `--label-filter`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OnOff {
+    /// yes
+    On,
+    /// no
+    Off,
 }
 
 /// `--missing-labels`, `--unknown-label`.

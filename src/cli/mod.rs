@@ -7,6 +7,7 @@ mod densify_point_cloud;
 mod duration;
 mod exchange_args;
 mod label_options;
+mod labels_args;
 mod listen;
 mod one_line;
 mod options;

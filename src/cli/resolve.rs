@@ -1,7 +1,9 @@
 //! From options as typed to jobs whose values are checked.
 
 use super::dense_config::{self, DenseConfig};
-use super::label_options::{CloudForms, ConsistencyMode, LabelInput, PlyLayout as TypedLayout, WhenMissing};
+use super::label_options::{
+    CloudForms, ConsistencyMode, LabelInput, OnOff, PlyLayout as TypedLayout, VotersMode, WhenMissing,
+};
 use super::options::{FilterKind, SharedOptions};
 use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
@@ -10,7 +12,7 @@ use crate::pipeline::{
     AcrossViews, FilterJob, LabelJob, MaskJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork,
 };
 use crate::scene::{NeighborOptions, OutsideRoi, PairingOptions, ResolutionOptions, RoiEstimation};
-use crate::semantics::{ClassRules, Consistency};
+use crate::semantics::{ClassRules, Consistency, Voters};
 use crate::stereo::{CpuLevel, StereoOptions};
 use crate::store::cloud::PlyLayout;
 use crate::store::labels::{LabelSources, MissingLabels, UnknownLabel};
@@ -240,6 +242,12 @@ pub(crate) fn rules(typed: &LabelInput) -> ClassRules {
             Some(ConsistencyMode::Support) | None => Consistency::Support,
         },
         border: typed.label_border,
+        voters: match typed.label_votes {
+            Some(VotersMode::Merged) => Voters::Merged,
+            Some(VotersMode::All) | None => Voters::All,
+        },
+        smooth: typed.label_smooth,
+        filter: typed.label_filter == OnOff::On,
     }
 }
 
@@ -251,14 +259,8 @@ pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Re
     let sources = LabelSources {
         label_path: typed.label_path.as_deref().map(place),
         class_table: typed.class_table.as_deref().map(|name| table(name, place)),
-        unknown: match typed.unknown_label {
-            WhenMissing::Error => UnknownLabel::Refuse,
-            WhenMissing::Void => UnknownLabel::Void,
-        },
-        missing: match typed.missing_labels {
-            WhenMissing::Error => MissingLabels::Refuse,
-            WhenMissing::Void => MissingLabels::Void,
-        },
+        unknown: unknown(typed.unknown_label),
+        missing: missing(typed.missing_labels),
     };
     let rules = rules(typed);
     if sources.are_given() {
@@ -269,10 +271,29 @@ pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Re
         (!rules.exclude.is_empty(), "--exclude-classes"),
         (typed.label_consistency.is_some(), "--label-consistency"),
         (typed.label_border > 0, "--label-border"),
+        (typed.label_votes.is_some(), "--label-votes"),
+        (typed.label_smooth > 0, "--label-smooth"),
+        (typed.label_filter == OnOff::On, "--label-filter"),
     ];
     match asked.iter().find(|(asked, _)| *asked) {
         Some((_, option)) => Err(Error::invalid(format!("{option} needs labels: {NEEDED}"))),
         None => Ok(None),
+    }
+}
+
+/// `--unknown-label`.
+pub(crate) fn unknown(typed: WhenMissing) -> UnknownLabel {
+    match typed {
+        WhenMissing::Error => UnknownLabel::Refuse,
+        WhenMissing::Void => UnknownLabel::Void,
+    }
+}
+
+/// `--missing-labels`.
+pub(crate) fn missing(typed: WhenMissing) -> MissingLabels {
+    match typed {
+        WhenMissing::Error => MissingLabels::Refuse,
+        WhenMissing::Void => MissingLabels::Void,
     }
 }
 
@@ -281,7 +302,7 @@ const NEEDED: &str =
     "give --label-path, the folder of the label maps, and --class-table unless they hold plain ids";
 
 /// A class table as typed: a file if there is one of that name, else the name of a built-in table.
-fn table(name: &str, place: &dyn Fn(&Path) -> PathBuf) -> String {
+pub(crate) fn table(name: &str, place: &dyn Fn(&Path) -> PathBuf) -> String {
     let path = place(Path::new(name));
     let is_builtin = crate::semantics::ClassTable::builtin_names().any(|builtin| builtin == name);
     match path.to_str() {

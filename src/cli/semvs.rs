@@ -59,6 +59,7 @@ fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crat
         Command::Export(args) => commands::export(args, &recorder.progress()),
         Command::Inspect(args) => commands::inspect(args),
         Command::Evaluate(args) => commands::evaluate(args),
+        Command::Labels(args) => commands::labels(args, &recorder.progress()),
     }?;
     Ok(ExitCode::SUCCESS)
 }

@@ -2,6 +2,7 @@
 
 use super::exchange_args::{ExportArgs, ImportArgs};
 use super::label_options::{CloudForms, LabelInput};
+use super::labels_args::LabelsArgs;
 use super::options::SharedOptions;
 use crate::store::colmap::Pass;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -53,6 +54,7 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     Evaluate(EvaluateArgs),
     Compare(CompareArgs),
+    Labels(LabelsArgs),
 }
 
 /// Make a dense cloud from a scene: depth maps, filters, fusion
@@ -137,6 +139,7 @@ const NOT_FOR_FUSE: &[&str] = &[
     "geometric_iters",
     "fusion_mode",
     "postprocess_dmaps",
+    "label_filter",
     "filter",
     "remove_dmaps",
 ];
@@ -179,7 +182,8 @@ pub(crate) struct ConvertArgs {
 }
 
 /// Label options that say how labels restrict fusion; refused where nothing is fused.
-const NOT_FOR_CONVERT: &[&str] = &["label_consistency", "label_border"];
+const NOT_FOR_CONVERT: &[&str] =
+    &["label_consistency", "label_border", "label_votes", "label_smooth", "label_filter"];
 
 const CONVERT_EXAMPLES: &str = "\
 Examples:

@@ -144,6 +144,6 @@ impl<'a> Merger<'a> {
             self.vote.dissent(view.label(pixel), view.pixels[pixel].weight);
         }
         let label = self.vote.outcome(views[0].label(own as usize));
-        if policy.is_kept(label.label) { Outcome::Point(label) } else { Outcome::ExcludedLabel }
+        if policy.is_candidate(label.label) { Outcome::Point(label) } else { Outcome::ExcludedLabel }
     }
 }

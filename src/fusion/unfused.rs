@@ -27,11 +27,13 @@ pub fn project_maps(
     let colors = maps.color.as_deref().filter(|_| layout.colors).map(|map| map.data());
     let confidences = estimate.confidence.as_ref().filter(|_| layout.confidence).map(|map| map.data());
     let normals = estimate.normal.as_ref().map(|map| map.data());
+    let certainties = maps.label_confidence.as_deref().map(|map| map.data());
+    let certainty = |pixel: usize| certainties.map_or(1.0, |certainties| certainties[pixel]);
     let views = [view];
     let mut points = 0;
     for (pixel, &depth) in estimate.depth.data().iter().enumerate() {
         let label = labels.map_or(0, |labels| labels[pixel]);
-        if depth <= 0.0 || policy.is_some_and(|policy| !policy.is_kept(label)) {
+        if depth <= 0.0 || policy.is_some_and(|policy| !policy.is_candidate(label)) {
             continue;
         }
         let (x, y) = ((pixel % width) as u32, (pixel / width) as u32);
@@ -44,7 +46,7 @@ pub fn project_maps(
             weights: &[],
             confidence: confidences.map_or(0.0, |confidences| confidences[pixel]),
             label: if layout.labels { label } else { 0 },
-            label_confidence: if layout.labels && label != 0 { 1.0 } else { 0.0 },
+            label_confidence: if layout.labels && label != 0 { certainty(pixel) } else { 0.0 },
         })?;
         points += 1;
     }

@@ -13,7 +13,7 @@ use super::prepare::{Prepared, load, name_unmatched, pixels_in_hand, prepare};
 use super::record::{Clock, view_rows, with_threads};
 use super::skip::Labels;
 use crate::error::{Error, Result};
-use crate::fusion::{AttributeSource, FusionOptions, WithNormals};
+use crate::fusion::{AttributeSource, FusionOptions, WithNormals, WithSmoothLabels};
 use crate::geometry::{Camera, Size};
 use crate::progress::{Event, Progress};
 use crate::report::{OutputReport, RunReport};
@@ -237,6 +237,12 @@ pub(super) fn write_results(
     let cloud: &dyn PointSource = match &with_normals {
         Some(cloud) => cloud,
         None => &fused.cloud,
+    };
+    let smooth = labels.map_or(0, |labels| labels.rules().smooth) as usize;
+    let smoothed = (smooth > 0).then(|| WithSmoothLabels::vote(cloud, smooth)).transpose()?;
+    let cloud: &dyn PointSource = match &smoothed {
+        Some(smoothed) => smoothed,
+        None => cloud,
     };
     let place = placement(outputs, &prepared.loaded.archive, progress);
     let written = write_cloud(outputs, cloud, labels, place, progress)?;

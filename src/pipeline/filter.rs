@@ -8,7 +8,7 @@ use crate::depth_filter::{
 };
 use crate::error::Result;
 use crate::progress::{Event, Progress, Stage};
-use crate::scene::{DepthEstimate, DepthMap, ImageId, ViewIndex};
+use crate::scene::{DepthEstimate, DepthMap, ImageId, LabelMap, ViewIndex};
 use crate::store::depth_store::{DepthStore, Lasting};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -39,13 +39,18 @@ pub(super) fn filter_across_views(
             let neighbors = prepared.neighbors[view.index()]
                 .retained
                 .iter()
-                .map(|n| prepared.id(n.view))
-                .filter(|id| ids.contains(id))
+                .map(|n| n.view)
+                .filter(|&n| ids.contains(&prepared.id(n)))
                 .take(most)
-                .map(|id| store.read(id))
-                .collect::<Result<Vec<Arc<DepthEstimate>>>>()?;
-            let against: Vec<FilterView<'_>> = neighbors.iter().map(|n| FilterView::new(n)).collect();
-            let own = FilterView::new(&reference);
+                .map(|n| Ok((n, store.read(prepared.id(n))?)))
+                .collect::<Result<Vec<(ViewIndex, Arc<DepthEstimate>)>>>()?;
+            let views: Vec<ViewIndex> = std::iter::once(view).chain(neighbors.iter().map(|n| n.0)).collect();
+            let labels = labels_of(prepared, &views, &reference)?;
+            let filter_view =
+                |i: usize, estimate| FilterView { estimate, labels: labels.get(i).map(|l| &**l) };
+            let against: Vec<FilterView<'_>> =
+                neighbors.iter().enumerate().map(|(i, n)| filter_view(i + 1, &n.1)).collect();
+            let own = filter_view(0, &reference);
             let mut filtered = match across {
                 AcrossViews::OpenMvs => filter_consistency(&own, &against, prepared.count(), options),
                 AcrossViews::Unbiased(options) => filter_unbiased(&own, &against, options),
@@ -64,6 +69,26 @@ pub(super) fn filter_across_views(
             Ok(())
         })
     })
+}
+
+/// The labels of `views` where the filter heeds them, borders void as the check wants them; else none.
+///
+/// # Errors
+/// As [`super::skip::Labels::maps`].
+fn labels_of(
+    prepared: &Prepared,
+    views: &[ViewIndex],
+    estimate: &DepthEstimate,
+) -> Result<Vec<Arc<LabelMap>>> {
+    let Some(labels) = prepared.labels.as_ref().filter(|labels| labels.rules().filter) else {
+        return Ok(Vec::new());
+    };
+    let of = |&view: &ViewIndex| {
+        let size = prepared.camera(view).map_or(estimate.depth.size(), |camera| camera.size());
+        let (map, checked) = labels.maps(view, size)?;
+        Ok(checked.unwrap_or(map))
+    };
+    views.iter().map(of).collect()
 }
 
 /// Number of pixels with a depth.

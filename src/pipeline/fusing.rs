@@ -1,6 +1,7 @@
 //! Depth maps to a cropped cloud.
 
 use super::job::RoiJob;
+use super::label_votes::LabelVotes;
 use super::prepare::Prepared;
 use crate::depth_filter::normals_from_depth;
 use crate::error::{Error, Result};
@@ -11,6 +12,7 @@ use crate::fusion::{
 use crate::geometry::Size;
 use crate::progress::{Event, Progress};
 use crate::scene::{DepthEstimate, PointSource, ViewIndex};
+use crate::semantics::{Consensus, Voters};
 use crate::store::depth_store::DepthStore;
 use crate::store::spool::{DEFAULT_SPOOL_MEMORY, PointSpool, SpooledCloud};
 use std::path::Path;
@@ -72,11 +74,14 @@ pub(super) fn fuse_maps(
 ) -> Result<Fused> {
     let start = Instant::now();
     let derive_normals = options.estimate_normals == AttributeSource::DuringFusion;
+    let voting = prepared.labels.as_ref().filter(|labels| labels.rules().voters == Voters::All);
+    let votes = voting.map(|labels| LabelVotes::new(prepared, labels, store, views));
     let maps = FusionSource {
         prepared,
         store,
         colors: options.estimate_colors != AttributeSource::None,
         derive_normals,
+        votes,
     };
     let fusion_views = fusion_views(prepared, store, views, derive_normals)?;
     let policy = prepared.labels.as_ref().map(|labels| labels.policy());
@@ -135,6 +140,8 @@ struct FusionSource<'a> {
     colors: bool,
     /// Maps without normals get them from the shape of their depths.
     derive_normals: bool,
+    /// Where all views vote on labels.
+    votes: Option<LabelVotes<'a>>,
 }
 
 impl MapSource for FusionSource<'_> {
@@ -149,13 +156,18 @@ impl MapSource for FusionSource<'_> {
         }
         let size = estimate.depth.size();
         let color = self.colors.then(|| self.prepared.images.color(view, size)).transpose()?;
-        let (labels, checked_labels) = match &self.prepared.labels {
-            Some(labels) => {
-                let (map, checked) = labels.maps(view, size)?;
-                (Some(map), checked)
+        let (labels, checked_labels, label_confidence) = match (&self.votes, &self.prepared.labels) {
+            (Some(votes), Some(labels)) => {
+                let Consensus { labels: map, confidence } = votes.of(view, &estimate)?;
+                let checked = labels.checked(&map);
+                (Some(Arc::new(map)), checked, Some(Arc::new(confidence)))
             }
-            None => (None, None),
+            (None, Some(labels)) => {
+                let (map, checked) = labels.maps(view, size)?;
+                (Some(map), checked, None)
+            }
+            (_, None) => (None, None, None),
         };
-        Ok(FusionMaps { estimate, color, labels, checked_labels })
+        Ok(FusionMaps { estimate, color, labels, checked_labels, label_confidence })
     }
 }

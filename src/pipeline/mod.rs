@@ -20,6 +20,9 @@ mod import;
 mod inputs;
 pub mod inspect;
 mod job;
+mod label_votes;
+mod labels_check;
+mod labels_render;
 mod masks;
 mod outputs;
 mod prepare;
@@ -45,4 +48,6 @@ pub use job::{
     AcrossViews, DensifyJob, DepthMapsJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob,
     SceneArchive, SceneJob, TowerJob, TowerWork,
 };
+pub use labels_check::{CheckLabelsJob, check_labels};
+pub use labels_render::{RenderLabelsJob, RenderedView, render_label_maps};
 pub use split::{SplitJob, split_scene};

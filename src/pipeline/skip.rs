@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geometry::{Camera, Size};
 use crate::progress::Progress;
 use crate::scene::{Grid, LabelMap, ViewIndex};
-use crate::semantics::{ClassPolicy, ClassTable, void_borders};
+use crate::semantics::{ClassPolicy, ClassRules, ClassTable, void_borders};
 use crate::store::images::image_size;
 use crate::store::import::LoadedScene;
 use crate::store::labels::{LabelRequest, LabelStore};
@@ -19,6 +19,7 @@ use std::sync::Arc;
 pub(super) struct Labels {
     store: LabelStore,
     policy: ClassPolicy,
+    rules: ClassRules,
 }
 
 impl Labels {
@@ -58,7 +59,7 @@ impl Labels {
     ) -> Result<Self> {
         let store = LabelStore::open(&job.sources, requests, Limits::default(), progress)?;
         let policy = ClassPolicy::new(store.table(), &job.rules)?;
-        Ok(Labels { store, policy })
+        Ok(Labels { store, policy, rules: job.rules.clone() })
     }
 
     /// The classes.
@@ -76,6 +77,11 @@ impl Labels {
         &self.policy
     }
 
+    /// What was asked of labels.
+    pub(super) fn rules(&self) -> &ClassRules {
+        &self.rules
+    }
+
     /// The label map of a view, if it has one.
     pub(super) fn file(&self, view: ViewIndex) -> Option<&Path> {
         self.store.file(view)
@@ -87,9 +93,14 @@ impl Labels {
     /// As [`LabelStore::load`].
     pub(super) fn maps(&self, view: ViewIndex, size: Size) -> Result<(Arc<LabelMap>, Option<Arc<LabelMap>>)> {
         let labels = self.store.load(view, size)?;
-        let border = self.policy.border();
-        let checked = (border > 0).then(|| Arc::new(void_borders(&labels, border)));
+        let checked = self.checked(&labels);
         Ok((labels, checked))
+    }
+
+    /// `labels` with void borders where the check wants them.
+    pub(super) fn checked(&self, labels: &LabelMap) -> Option<Arc<LabelMap>> {
+        let border = self.policy.border();
+        (border > 0).then(|| Arc::new(void_borders(labels, border)))
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) enum SharedColors {
 }
 
 const TABLE_KEYS: [&str; 4] = ["name", "void-name", "void-colors", "class"];
-const CLASS_KEYS: [&str; 6] = ["id", "name", "color", "keep", "estimate", "las"];
+const CLASS_KEYS: [&str; 7] = ["id", "name", "color", "keep", "estimate", "surface", "las"];
 
 /// Reads a class table from TOML; `path` is for messages and, without a `name` key, for the table's name.
 pub(super) fn parse(text: &str, path: &Path, shared: SharedColors) -> Result<ClassTable> {
@@ -75,6 +75,9 @@ fn parse_class(source: Source<'_>, value: &Spanned<DeValue<'_>>, void_colors: &[
     }
     if let Some(value) = keys.value("keep") {
         class.keep = source.boolean("class.keep", value)?;
+    }
+    if let Some(value) = keys.value("surface") {
+        class.surface = source.boolean("class.surface", value)?;
     }
     class.estimate =
         keys.value("estimate").map(|value| source.boolean("class.estimate", value)).transpose()?;
@@ -306,7 +309,7 @@ mod tests {
     #[test]
     fn a_full_table_is_read() {
         let text = "name = \"facade\"\nvoid-name = \"other\"\nvoid-colors = [[9, 9, 9]]\n[[class]]\nid = 65535\nname = \"sky\"\n\
-                    color = [255, 255, 0]\nkeep = false\nestimate = true\nlas = 6\n[[class]]\nid = 0x1\nname = \"wall\"\n";
+                    color = [255, 255, 0]\nkeep = false\nestimate = true\nsurface = false\nlas = 6\n[[class]]\nid = 0x1\nname = \"wall\"\n";
         let table = ClassTable::from_toml(text, Path::new("t.toml")).unwrap();
         assert_eq!(table.name(), "facade");
         let [wall, sky] = table.classes() else { panic!("{table:?}") };
@@ -318,6 +321,7 @@ mod tests {
             color,
             keep: false,
             estimate: Some(true),
+            surface: false,
             las: Some(6),
         };
         assert_eq!(*sky, expected);

@@ -47,6 +47,8 @@ pub struct Class {
     pub keep: bool,
     /// Whether depths of this class are estimated; `None`: where the class is kept.
     pub estimate: Option<bool>,
+    /// Whether what it labels has a surface; sky has none.
+    pub surface: bool,
     /// ASPRS LAS classification code.
     pub las: Option<u8>,
 }
@@ -281,7 +283,7 @@ impl ClassTable {
 
 /// A class with everything but id and name at its default.
 pub(super) fn plain_class(id: ClassId, name: String) -> Class {
-    Class { id, name, color: None, keep: true, estimate: None, las: None }
+    Class { id, name, color: None, keep: true, estimate: None, surface: true, las: None }
 }
 
 /// One colour per class: its own where it has one, else the palette's, moved on where that one is taken.

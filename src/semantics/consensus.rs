@@ -17,13 +17,14 @@ pub struct ConsensusOptions {
     /// Distance from a class border in depth-map pixels, up to 255, from which a pixel has a whole vote; nearer ones have
     /// less in proportion. Default 4.
     pub border: u8,
-    /// Vote, 0..1, of a pixel without depth, which may see something in front of the surface. Default 0.3.
+    /// Vote, 0..1, of a pixel without depth, which may see something in front of the surface. Default 0: pixels of classes
+    /// that are not estimated have no depth, and what is excluded must not take the rest with it.
     pub without_depth: f32,
 }
 
 impl Default for ConsensusOptions {
     fn default() -> Self {
-        ConsensusOptions { max_depth_diff: 0.01, border: 4, without_depth: 0.3 }
+        ConsensusOptions { max_depth_diff: 0.01, border: 4, without_depth: 0.0 }
     }
 }
 
@@ -55,8 +56,7 @@ const EVIDENCE_PER_VOTE: f32 = 1.0;
 
 /// The vote of `reference` and all `others` on the class of every pixel of `reference` that has a depth.
 ///
-/// A view has a vote on a point if its pixel there measures the same depth, and a smaller one if it measures none; void
-/// has no vote. Ties go to the pixel's own label, then to the smaller id. With `v` the votes of a class, its confidence
+/// A view has a vote on a point if its pixel there measures the same depth; void has no vote. Ties go to the pixel's own label, then to the smaller id. With `v` the votes of a class, its confidence
 /// is `exp(v) / (1 + Σ exp(v'))` over all classes voted for: the posterior of independent votes, the 1 standing for a
 /// class that nobody named. A single view is believed at 0.73, four that agree at 0.98, four against two at 0.87.
 ///

@@ -9,10 +9,14 @@ mod consensus;
 mod label_map;
 mod names;
 mod policy;
+mod render;
+mod smooth;
 mod vote;
 
 pub use classes::{Class, ClassId, ClassTable};
 pub use consensus::{Consensus, ConsensusOptions, Witness, border_distance, label_consensus};
 pub use label_map::{nearest_labels, void_borders};
-pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency};
+pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency, Voters};
+pub use render::{LabelledSurface, point_radii, render_labels};
+pub use smooth::smooth_labels;
 pub use vote::{LabelVote, Vote};

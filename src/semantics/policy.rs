@@ -26,6 +26,26 @@ impl Consistency {
     }
 }
 
+/// Which pixels have a vote on the label of a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Voters {
+    /// Those of all views that see the surface, before anything is fused: the check reads the labels voted for.
+    #[default]
+    All,
+    /// Those that are merged into the point.
+    Merged,
+}
+
+impl Voters {
+    /// As the command line spells it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Voters::All => "all",
+            Voters::Merged => "merged",
+        }
+    }
+}
+
 /// Which classes are wanted and how strictly labels are compared, as the user asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClassRules {
@@ -37,6 +57,13 @@ pub struct ClassRules {
     pub consistency: Consistency,
     /// Width in depth-map pixels of the band along class borders that counts as void in the check. Default: 0.
     pub border: u32,
+    /// Which pixels have a vote on the label of a point. Default: all.
+    pub voters: Voters,
+    /// Points around a point that vote on its label once more, after fusion; 0 = none. Default: 0.
+    pub smooth: u32,
+    /// Whether the filter across views lets a neighbour's pixel of another class neither confirm nor refute a depth.
+    /// Default: false.
+    pub filter: bool,
 }
 
 /// Whether two labels may meet in one point.
@@ -55,6 +82,8 @@ pub enum Agreement {
 pub struct ClassPolicy {
     kept: Vec<bool>,
     estimated: Vec<bool>,
+    /// Classes without a surface, where labels are compared.
+    without_surface: Vec<ClassId>,
     others_kept: bool,
     consistency: Consistency,
     border: u32,
@@ -65,6 +94,7 @@ impl Default for ClassPolicy {
         ClassPolicy {
             kept: Vec::new(),
             estimated: Vec::new(),
+            without_surface: Vec::new(),
             others_kept: true,
             consistency: Consistency::Off,
             border: 0,
@@ -76,7 +106,8 @@ impl ClassPolicy {
     /// The policy that `rules` mean for the classes of `table`.
     ///
     /// `classes` overrides the table's `keep`; `exclude` drops in either case. Void is kept unless `classes` leaves it
-    /// out or `exclude` names it.
+    /// out or `exclude` names it. Classes without a surface make no points unless `classes` names them or labels are
+    /// not compared.
     ///
     /// # Errors
     /// A rule names a class that the table lacks, or nothing would be kept.
@@ -103,7 +134,11 @@ impl ClassPolicy {
                 "no class is kept: --classes and --exclude-classes cancel out",
             ));
         }
-        Ok(ClassPolicy { kept, estimated, others_kept, consistency: rules.consistency, border: rules.border })
+        let is_surface = |id: &ClassId| wanted.contains(id) || rules.consistency == Consistency::Off;
+        let without_surface = table.classes().iter().filter(|class| !class.surface).map(|class| class.id);
+        let without_surface = without_surface.filter(|id| !is_surface(id)).collect();
+        let (consistency, border) = (rules.consistency, rules.border);
+        Ok(ClassPolicy { kept, estimated, without_surface, others_kept, consistency, border })
     }
 
     /// The same, but `id` is neither kept nor estimated.
@@ -119,7 +154,8 @@ impl ClassPolicy {
     /// Whether a pixel of this class may start a point.
     #[inline]
     pub fn is_candidate(&self, id: impl Into<ClassId>) -> bool {
-        self.is_kept(id)
+        let id = id.into();
+        self.is_kept(id) && !self.without_surface.contains(&id)
     }
 
     /// Whether a point of this class belongs in the cloud.
@@ -159,7 +195,7 @@ impl ClassPolicy {
 
     /// Whether no class is dropped: then labels cannot remove a pixel by themselves.
     pub fn keeps_everything(&self) -> bool {
-        self.others_kept && self.kept.iter().all(|&kept| kept)
+        self.others_kept && self.without_surface.is_empty() && self.kept.iter().all(|&kept| kept)
     }
 }
 
@@ -182,13 +218,25 @@ mod tests {
 
     #[test]
     fn without_rules_everything_is_kept_and_estimated() {
-        for policy in [ClassPolicy::default(), policy("3dom-facade", &[], &[]).unwrap()] {
+        for policy in [ClassPolicy::default(), policy("openmvs-aerial", &[], &[]).unwrap()] {
             assert!(
                 (0..=u16::MAX)
                     .all(|id| policy.is_kept(id) && policy.is_candidate(id) && policy.is_estimated(id))
             );
             assert!(policy.keeps_everything());
         }
+    }
+
+    #[test]
+    fn what_has_no_surface_makes_no_points_unless_it_is_asked_for_or_nothing_is_compared() {
+        const SKY: u16 = 2;
+        let default = policy("3dom-facade", &[], &[]).unwrap();
+        assert_eq!((0..9).filter(|&id| !default.is_candidate(id)).collect::<Vec<u16>>(), [SKY]);
+        assert!(default.is_kept(SKY) && default.is_estimated(SKY) && !default.keeps_everything());
+        assert!(policy("3dom-facade", &["sky", "door"], &[]).unwrap().is_candidate(SKY));
+        let off = ClassRules { consistency: Consistency::Off, ..ClassRules::default() };
+        let off = ClassPolicy::new(&ClassTable::builtin("3dom-facade").unwrap(), &off).unwrap();
+        assert!(off.is_candidate(SKY) && off.keeps_everything());
     }
 
     #[test]

@@ -157,6 +157,47 @@ impl LabelStore {
     }
 }
 
+/// What is there in the way of a label map for a view.
+#[derive(Debug)]
+pub struct LabelFinding {
+    /// The view.
+    pub view: ViewIndex,
+    /// The label map, if there is a file.
+    pub file: Option<PathBuf>,
+    /// Pixels of each class, or what is wrong with the map; empty without file.
+    pub counts: Result<BTreeMap<ClassId, u64>>,
+}
+
+/// Looks for the label maps of all views and reads each, whatever may be wrong with the others. The table holds, for
+/// `ids`, what was met.
+///
+/// # Errors
+/// The class table cannot be used; the folder of label maps is not there.
+pub fn survey_labels(
+    sources: &LabelSources,
+    views: &[LabelRequest],
+    limits: Limits,
+) -> Result<(ClassTable, Vec<LabelFinding>)> {
+    sources.check_folder()?;
+    let (table, table_is_assumed) = class_table(sources, limits)?;
+    let reader =
+        LabelReader { colors: table.colors(), table, table_is_assumed, unknown: sources.unknown, limits };
+    let find = |request: &LabelRequest| LabelFinding {
+        view: request.view,
+        file: found_file(sources, request),
+        counts: match found_file(sources, request) {
+            Some(path) => {
+                reader.read(&path, |size| check_aspect(&path, size, request)).map(|map| count_classes(&map))
+            }
+            None => Ok(BTreeMap::new()),
+        },
+    };
+    let findings: Vec<LabelFinding> = views.par_iter().map(find).collect();
+    let met =
+        findings.iter().filter_map(|f| f.counts.as_ref().ok()).flat_map(|counts| counts.keys().copied());
+    Ok((reader.table.with_ids(met), findings))
+}
+
 /// Pixels of each class.
 pub fn count_classes(labels: &LabelMap) -> BTreeMap<ClassId, u64> {
     let mut counts: BTreeMap<ClassId, u64> = BTreeMap::new();
@@ -222,6 +263,12 @@ pub fn candidate_files(label_path: Option<&Path>, request: &LabelRequest) -> Vec
     candidates
 }
 
+/// The first candidate that is there; a photograph in the folder of label maps is no label map.
+fn found_file(sources: &LabelSources, request: &LabelRequest) -> Option<PathBuf> {
+    let candidates = candidate_files(sources.label_path.as_deref(), request);
+    candidates.into_iter().find(|path| path.is_file() && !is_same_file(path, &request.image))
+}
+
 /// The label map of every view that has one.
 fn find_all(
     sources: &LabelSources,
@@ -231,10 +278,7 @@ fn find_all(
     let mut files = HashMap::new();
     let mut without = Vec::new();
     for request in views {
-        let candidates = candidate_files(sources.label_path.as_deref(), request);
-        // A photograph in the folder of label maps is no label map.
-        let found = candidates.into_iter().find(|path| path.is_file() && !is_same_file(path, &request.image));
-        match found {
+        match found_file(sources, request) {
             Some(path) => drop(files.insert(request.view, path)),
             None => without.push(request),
         }

@@ -17,6 +17,7 @@ pub mod images;
 pub mod import;
 mod jpeg;
 mod label_png;
+pub mod label_write;
 pub mod labels;
 mod las_cloud;
 mod legend;

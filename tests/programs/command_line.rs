@@ -30,7 +30,9 @@ fn golden(name: &str, text: &str) {
 fn help_is_as_agreed() {
     let scratch = Scratch::new();
     golden("semvs.txt", &scratch.semvs("--help").ok().stdout);
-    for command in ["densify", "fuse", "convert", "import", "export", "inspect", "evaluate", "compare"] {
+    for command in
+        ["densify", "fuse", "convert", "import", "export", "inspect", "evaluate", "compare", "labels"]
+    {
         let help = scratch.semvs(&format!("{command} --help")).ok().stdout;
         golden(&format!("semvs-{command}.txt"), &help);
     }

@@ -13,6 +13,7 @@ mod compare;
 mod corners;
 mod exact_runs;
 mod exchange;
+mod labels;
 mod masks;
 mod pipelines;
 mod runs;

@@ -1,6 +1,7 @@
 //! `semvs convert`.
 
 use super::cloud_path;
+use crate::cli::label_options::OnOff;
 use crate::cli::resolve;
 use crate::cli::semvs_args::ConvertArgs;
 use crate::error::{Error, Result};
@@ -14,6 +15,9 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
     let asked = [
         (args.labels.label_consistency.is_some(), "--label-consistency"),
         (args.labels.label_border > 0, "--label-border"),
+        (args.labels.label_votes.is_some(), "--label-votes"),
+        (args.labels.label_smooth > 0, "--label-smooth"),
+        (args.labels.label_filter == OnOff::On, "--label-filter"),
     ];
     if let Some((_, option)) = asked.iter().find(|(asked, _)| *asked) {
         return Err(Error::invalid(format!(

@@ -61,6 +61,7 @@ pub(crate) fn resolve(
     meant.extend(depth_maps.map(|folder| ("depth-maps", path(folder))));
     if let Some(labels) = &input.labels {
         meant.push(("label-consistency", labels.rules.consistency.name().into()));
+        meant.push(("label-votes", labels.rules.voters.name().into()));
     }
     if let Some(filter) = filter {
         let bits = [filter.speckles, filter.gaps, filter.across.is_some()];

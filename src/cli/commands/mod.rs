@@ -9,6 +9,7 @@ mod export;
 mod fuse;
 mod import;
 mod inspect;
+mod labels;
 
 pub(crate) use compare::{INCOMPARABLE, compare};
 pub(crate) use convert::convert;
@@ -18,6 +19,7 @@ pub(crate) use export::export;
 pub(crate) use fuse::fuse;
 pub(crate) use import::import;
 pub(crate) use inspect::inspect;
+pub(crate) use labels::labels;
 
 use super::exchange_args::ArchiveArgs;
 use super::label_options::LabelOutput;
