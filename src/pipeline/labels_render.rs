@@ -11,11 +11,12 @@ use crate::store::import::load_scene;
 use crate::store::label_write::{LabelEncoding, has_colors, write_label_map};
 use crate::store::labels::{LabelSources, MissingLabels, UnknownLabel};
 use crate::store::paths::is_same_file;
+use crate::store::ply_source::PlySource;
 use rayon::prelude::*;
 use semvs_formats::{Limits, ply};
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// `labels render`.
 #[derive(Clone, Debug)]
@@ -111,7 +112,7 @@ fn read_surface(job: &RenderLabelsJob) -> Result<(LabelledSurface, ClassTable)> 
             let (unknown, missing) = (UnknownLabel::default(), MissingLabels::default());
             LabelSources { label_path: None, class_table, unknown, missing }.table(Limits::default())?
         }
-        None => table_of(path, &cloud.comments)?,
+        None => PlySource::open(path, Limits::default())?.listed_classes()?.unwrap_or_else(ClassTable::ids),
     };
     let mut met: BTreeMap<u16, usize> = BTreeMap::new();
     cloud.labels.iter().for_each(|id| *met.entry(*id).or_default() += 1);
@@ -134,40 +135,4 @@ fn read_surface(job: &RenderLabelsJob) -> Result<(LabelledSurface, ClassTable)> 
     let labels = keep.iter().map(|&i| cloud.labels[i]).collect();
     let radii = point_radii(&positions);
     Ok((LabelledSurface { positions, normals, labels, radii }, table))
-}
-
-/// The classes that the header of a cloud names (`class ID NAME R G B`); plain ids if it names none.
-fn table_of(path: &Path, comments: &[String]) -> Result<ClassTable> {
-    let mut text = String::from("name = \"the cloud's own classes\"\n");
-    let mut classes = 0;
-    for comment in comments {
-        let words: Vec<&str> = comment.split_whitespace().collect();
-        if let ["class", id, name, r, g, b] = words[..] {
-            classes += 1;
-            let name = name.replace(['"', '\\'], "");
-            text.push_str(&format!("[[class]]\nid = {id}\nname = \"{name}\"\ncolor = [{r}, {g}, {b}]\n"));
-        }
-    }
-    if classes == 0 {
-        return Ok(ClassTable::ids());
-    }
-    ClassTable::from_toml(&text, path)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_classes_of_a_cloud_are_those_of_its_header() {
-        let comments =
-            ["made by x", "class 1 building 0 0 255", "class 4 dark_window 0 255 0"].map(String::from);
-        let table = table_of(Path::new("c.ply"), &comments).unwrap();
-        assert_eq!(table.resolve("dark window").unwrap(), ClassId(4));
-        assert_eq!(table.color(ClassId(1)), [0, 0, 255]);
-        assert!(has_colors(&table));
-        assert_eq!(table_of(Path::new("c.ply"), &comments[..1]).unwrap(), ClassTable::ids());
-        let broken = ["class 1 building 0 0 999".to_owned()];
-        assert!(table_of(Path::new("c.ply"), &broken).unwrap_err().to_string().contains("c.ply"));
-    }
 }

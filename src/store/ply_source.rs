@@ -110,7 +110,15 @@ fn listed_class(comment: &str) -> Option<Class> {
     };
     let id: u16 = id.parse().ok().filter(|&id| id > 0)?;
     let color = Some([r.parse().ok()?, g.parse().ok()?, b.parse().ok()?]);
-    Some(Class { id: ClassId(id), name: name.to_owned(), color, keep: true, estimate: None, las: None })
+    Some(Class {
+        id: ClassId(id),
+        name: name.to_owned(),
+        color,
+        keep: true,
+        estimate: None,
+        surface: true,
+        las: None,
+    })
 }
 
 impl PointSource for PlySource {
