@@ -121,7 +121,7 @@ mod tests {
             faults: 1,
         };
         let text = check.text();
-        assert!(text.contains("b.jpg  50.0 %  50.0 %          20.0 %"), "{text}");
+        assert!(text.contains("b.jpg   50.0 %  50.0 %          20.0 %"), "{text}");
         assert!(text.contains("c.jpg: no label map"), "{text}");
         assert!(text.contains("most at odds with the others: b.jpg (20.0 %), a.jpg (1.0 %)"), "{text}");
         assert!(!text.contains("void"), "{text}");

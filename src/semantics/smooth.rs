@@ -74,7 +74,7 @@ mod tests {
         let smooth = smooth_labels(&positions, &normals, &labels, 8);
         let same = |(a, b): (&LabelVote, &LabelVote)| a.label == b.label;
         assert!(smooth.iter().zip(&right).all(same));
-        assert!(smooth[45].confidence < smooth[50].confidence && smooth[50].confidence > 0.89);
+        assert!(smooth[45].confidence < smooth[55].confidence && smooth[55].confidence > 0.89);
     }
 
     #[test]
