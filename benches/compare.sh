@@ -123,7 +123,8 @@ stored_rows() {
 cd "$work"
 {
     printf '### %s\n\n`%s`, everything else default. ' "$name" "$settings"
-    printf 'CPU: user and system seconds of the whole process, median of %s runs in turn (least–most); ' "$rounds"
+    printf 'CPU: user and system seconds of the whole process, median of %s in turn (least–most); ' \
+        "$([ "$rounds" = 1 ] && echo 'one run' || echo "$rounds runs")"
     printf 'F1 within %s scene units of the truth; gross: share of points farther off than ten times the first of them.\n\n' \
         "$(printf '%s' "$thresholds" | sed 's/ /, /g')"
     printf '| program | CPU s | OpenMVS ÷ this | wall s | peak MB | points | F1 | gross |\n'

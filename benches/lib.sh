@@ -48,13 +48,17 @@ pixels() {
     awk '/"width":/ { w = $2 + 0 } /"height":/ { p += w * ($2 + 0) } END { print p }' "$1"
 }
 
+# Processes that wanted a processor when it began.
+load=$(cut -d ' ' -f 1 /proc/loadavg 2>/dev/null || echo '?')
+
 # What the figures were measured on, in a line.
 machine() {
     local model memory
     model=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1)
     memory=$(awk '/MemTotal/ { printf "%.0f GB", $2 / 1e6 }' /proc/meminfo 2>/dev/null)
-    printf '%s, %s threads, %s, %s, %s' "${model:-unknown processor}" "$(getconf _NPROCESSORS_ONLN)" "${memory:-?}" \
-        "$("$bin/semvs" --version | paste -sd ' ' | sed 's/kernels:/with the kernels/')" "$(LC_ALL=C date '+%B %Y')"
+    printf '%s, %s threads, %s, %s, %s; load %s from other work when it began, which wall times suffer from' \
+        "${model:-unknown processor}" "$(getconf _NPROCESSORS_ONLN)" "${memory:-?}" \
+        "$("$bin/semvs" --version | paste -sd ' ' | sed 's/kernels:/with the kernels/')" "$(LC_ALL=C date '+%B %Y')" "$load"
 }
 
 # section NAME: puts standard input in the place of that section of the page, or at its end.
