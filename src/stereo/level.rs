@@ -12,10 +12,12 @@ use nalgebra::{Matrix3, Vector3};
 pub(crate) const PAD: usize = 32;
 /// Mid-grey, subtracted so that sums of squares keep their digits.
 const MID_GREY: f32 = 128.0;
-/// Mid-grey in sixteenths of a grey level.
-const MID_SIXTEENTHS: i16 = 128 * 16;
+/// Steps per grey level of the reference.
+pub(crate) const STEPS: f32 = 64.0;
+/// Largest side of an image, in pixels.
+pub(crate) const MAX_SIDE: u32 = 32_767;
 
-/// The reference image with a margin, grey levels 0..255 minus mid-grey.
+/// The reference image with a margin: whole numbers of 1/64 grey levels, 0..255 minus mid-grey.
 pub(crate) struct Reference {
     stride: usize,
     data: Vec<f32>,
@@ -29,7 +31,8 @@ impl Reference {
         for y in 0..h + 2 * PAD {
             let row = gray.row(y.saturating_sub(PAD).min(h - 1));
             for x in 0..stride {
-                data.push(row[x.saturating_sub(PAD).min(w - 1)] * 255.0 - MID_GREY);
+                let level = row[x.saturating_sub(PAD).min(w - 1)].clamp(0.0, 1.0) * 255.0 - MID_GREY;
+                data.push((level * STEPS).floor());
             }
         }
         Reference { stride, data }
@@ -46,9 +49,11 @@ impl Reference {
 pub(crate) struct Source {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Per pixel its grey level in the low half and the one below it in the high half, signed, in sixteenths from
-    /// mid-grey; one pair more than pixels.
-    pub(crate) pairs: Vec<u32>,
+    /// Per pixel the grey levels, signed, from mid-grey, of itself, the next one, the one below it and the one next to
+    /// that, from the low byte up.
+    pub(crate) quads: Vec<u32>,
+    /// The grey levels alone, and [`Source::SPARE_ROWS`] rows and a few bytes more.
+    pub(crate) bytes: Vec<u8>,
     /// Homogeneous source pixel = `a · (x, y, 1) + b · w`.
     pub(crate) a: [[f32; 3]; 3],
     pub(crate) b: [f32; 3],
@@ -79,8 +84,30 @@ pub(crate) struct Level {
     pub(crate) w_range: (f32, f32),
     /// Largest shift in any source, in pixels, per unit of inverse depth, at the image centre.
     pub(crate) pixels_per_w: f32,
+    /// How matching windows are weighted.
+    pub(crate) weighting: Weighting,
     /// Weight of the geometric term.
     pub(crate) geometric_weight: f32,
+}
+
+/// Falloffs of a texel's bilateral weight e⁻ˣ (Yoon & Kweon 2006) in a matching window: `x = grey · Δg² + space · Δp²`,
+/// with differences to the window's centre in grey levels and in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Weighting {
+    pub(crate) grey: f32,
+    pub(crate) space: f32,
+}
+
+impl Weighting {
+    /// While hypotheses are searched for: σ = 17 grey levels, 4.2 pixels. Wide windows find the right plane.
+    pub(crate) const SEARCH: Self =
+        Weighting { grey: 1.0 / (2.0 * 17.3 * 17.3), space: 1.0 / (2.0 * 4.24 * 4.24) };
+    /// Where nothing comes after the search: σ = 17 grey levels, 3 pixels.
+    pub(crate) const ALONE: Self =
+        Weighting { grey: 1.0 / (2.0 * 17.3 * 17.3), space: 1.0 / (2.0 * 3.0 * 3.0) };
+    /// While the neighbours' depth maps help: σ = 12 grey levels, 1.9 pixels. Narrow windows tell depth edges apart.
+    pub(crate) const REFINE: Self =
+        Weighting { grey: 1.0 / (2.0 * 12.2 * 12.2), space: 1.0 / (2.0 * 1.9 * 1.9) };
 }
 
 impl Level {
@@ -102,7 +129,8 @@ impl Level {
                 Source {
                     width: gray.width(),
                     height: gray.height(),
-                    pairs: pairs(&gray),
+                    bytes: bytes(&gray),
+                    quads: quads(&gray),
                     a: rows_f32(&a),
                     b: [b.x as f32, b.y as f32, b.z as f32],
                     geometry: None,
@@ -117,6 +145,7 @@ impl Level {
             w_range,
             pixels_per_w: pixels_per_w.max(f32::MIN_POSITIVE),
             geometric_weight: 0.0,
+            weighting: Weighting::SEARCH,
         }
     }
 
@@ -128,6 +157,7 @@ impl Level {
         weight: f32,
     ) -> Self {
         self.geometric_weight = weight;
+        self.weighting = Weighting::REFINE;
         for (source, map) in self.sources.iter_mut().zip(maps) {
             source.geometry = map.map(|m| source_geometry(reference, m));
         }
@@ -183,16 +213,43 @@ fn typical_inverse_depth(problem: &StereoProblem) -> f32 {
     w[w.len() / 2]
 }
 
-/// Packs every pixel's grey level and the one below it, and one spare pair behind the last.
-fn pairs(gray: &GrayImage) -> Vec<u32> {
+impl Source {
+    /// Rows behind the last one.
+    const SPARE_ROWS: usize = 8;
+
+    /// The grey level at the pixel of `(u, v)`, or the nearest one, in the units of [`Lanes::bilinear`].
+    ///
+    /// [`Lanes::bilinear`]: super::cost::lanes::Lanes::bilinear
+    pub(crate) fn level_at(&self, u: f32, v: f32) -> u32 {
+        let x = (u.max(0.0) as usize).min(self.width - 1);
+        let y = (v.max(0.0) as usize).min(self.height - 1);
+        let level = self.bytes.get(y * self.width + x).copied().unwrap_or(0) as i8;
+        ((i32::from(level) * 255 * 255) << 5) as u32
+    }
+}
+
+/// Grey level from mid-grey, as the bits of a signed byte.
+fn level_byte(v: f32) -> u8 {
+    (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8 ^ 0x80
+}
+
+fn bytes(gray: &GrayImage) -> Vec<u8> {
+    let mut out = Vec::with_capacity(gray.width() * (gray.height() + Source::SPARE_ROWS) + 16);
+    out.extend(gray.data().iter().map(|&v| level_byte(v)));
+    out.resize(gray.width() * (gray.height() + Source::SPARE_ROWS) + 16, 0);
+    out
+}
+
+/// Packs every pixel's grey level with those of the three pixels next to and below it.
+fn quads(gray: &GrayImage) -> Vec<u32> {
     let (w, h) = (gray.width(), gray.height());
-    let level = |v: f32| u32::from(((v.clamp(0.0, 1.0) * 255.0 * 16.0 + 0.5) as i16 - MID_SIXTEENTHS) as u16);
-    let mut out = Vec::with_capacity(w * h + 1);
+    let level = |v: f32| u32::from(level_byte(v));
+    let mut out = Vec::with_capacity(w * h);
     for y in 0..h {
         let (top, bottom) = (gray.row(y), gray.row((y + 1).min(h - 1)));
-        out.extend(top.iter().zip(bottom).map(|(&t, &b)| level(t) | level(b) << 16));
+        let pair = |x: usize| level(top[x]) | level(bottom[x]) << 16;
+        out.extend((0..w).map(|x| pair(x) | pair((x + 1).min(w - 1)) << 8));
     }
-    out.push(0);
     out
 }
 

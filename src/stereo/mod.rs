@@ -19,13 +19,13 @@ mod tests;
 mod tile;
 
 pub use cost::CpuLevel;
-pub use options::StereoOptions;
+pub use options::{Quality, StereoOptions};
 pub use problem::{SourceImage, SparsePoint, StereoProblem};
 
 use crate::scene::DepthEstimate;
 use crate::{Error, Result};
 use cost::Kernels;
-use level::Level;
+use level::{Level, MAX_SIDE, Weighting};
 use plane::Pinhole;
 use solver::{Pass, Solver};
 use state::State;
@@ -39,7 +39,7 @@ const RELAXED: f32 = 4.0 / 3.0;
 /// Estimates depth, normals and confidence of the reference view by photometric matching.
 ///
 /// Depths are in scene units along the reference's optical axis, normals in its camera frame, confidence is
-/// (1 − cost)⁴. The result depends on the problem and the options alone. If geometric passes follow
+/// (1 − cost)⁸. The result depends on the problem and the options alone. If geometric passes follow
 /// (`options.geometric_iterations > 0`) the threshold on the cost is relaxed by a third.
 ///
 /// # Errors
@@ -53,14 +53,18 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
     let mut previous: Option<State> = None;
     let mut finished = None;
     for halvings in (0..=coarsest).rev() {
-        let level = Level::new(problem, halvings);
+        let mut level = Level::new(problem, halvings);
+        if halvings == 0 && options.geometric_iterations == 0 {
+            level.weighting = Weighting::ALONE;
+        }
         let mut state = match &previous {
             None => State::random(&level, problem, view, options.seed),
             Some(coarse) => State::refined(&level, coarse, problem.skip.as_ref()),
         };
         let mut solver = Solver::new(kernels, &level, options.seed, view);
         solver.score(&mut state);
-        for i in 0..options.iterations {
+        let spared = u32::from(halvings == 0 && coarsest > 0);
+        for i in 0..options.iterations.saturating_sub(spared).max(1) {
             let at_start = halvings == coarsest && i == 0;
             solver.pass(
                 &mut state,
@@ -71,7 +75,8 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
                     candidates: options.candidates as usize,
                     random: if at_start { 32 } else { 0 },
                     random_if_bad: if halvings == coarsest { 8 } else { 4 },
-                    views: options.refine_views as usize,
+                    refinements: options.refinements as usize,
+                    views: options.compared_views as usize,
                     fresh: i == 0,
                 },
             );
@@ -133,7 +138,8 @@ pub fn refine_geometric(
             candidates: options.candidates as usize,
             random: 0,
             random_if_bad: 0,
-            views: options.refine_views as usize,
+            refinements: options.refinements as usize,
+            views: options.compared_views as usize + 1,
             fresh: false,
         },
     );
@@ -157,6 +163,13 @@ fn check(problem: &StereoProblem) -> Result<()> {
         return fail(format!("the depth range {low} to {high} is not usable"));
     }
     for image in std::iter::once(&problem.reference).chain(&problem.sources) {
+        let side = image.gray.width().max(image.gray.height());
+        if side > MAX_SIDE as usize {
+            return fail(format!(
+                "image {} has {side} pixels on a side, more than {MAX_SIDE}; halve the resolution",
+                image.id
+            ));
+        }
         let (of_image, of_camera) = (image.gray.size(), image.camera.size());
         if of_image != of_camera || of_image.area() == 0 {
             return fail(format!("image {} is {of_image}, its camera is for {of_camera}", image.id));

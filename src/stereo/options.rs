@@ -2,20 +2,47 @@
 
 use crate::{Error, Result};
 
+/// How much is tried for every depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// For a look: about 0.6 of the normal time.
+    Draft,
+    /// What matches OpenMVS's depth maps.
+    #[default]
+    Normal,
+    /// For the last details: about 1.5 times the normal time.
+    High,
+}
+
+impl Quality {
+    /// Name as given on the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quality::Draft => "draft",
+            Quality::Normal => "normal",
+            Quality::High => "high",
+        }
+    }
+}
+
 /// Options of depth estimation. Angles are in degrees, costs on the 0 (best) .. 2 (worst) scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StereoOptions {
     /// Coarser levels estimated before the full resolution, each half the size of the next. 0..=8. Default: 2.
     pub levels: u32,
-    /// Iterations over all tiles on every level. 1..=100. Default: 3.
+    /// Iterations over all tiles on every level; the full resolution, which starts from a coarser one, takes one less.
+    /// 1..=100. Default: 3.
     pub iterations: u32,
     /// Passes that also compare a hypothesis with the neighbours' depth maps. 0..=100. Default: 2.
     pub geometric_iterations: u32,
-    /// Hypotheses of each kind that a tile tries at a visit. 1..=64. Default: 6.
+    /// Planes from within a tile, and as many from beside it, that its pixels try at a visit. 1..=64. Default: 6.
     pub candidates: u32,
-    /// Source views, the best of each tile, that small changes of a plane are compared with. 1..=64. Default: 3.
-    pub refine_views: u32,
-    /// A pixel whose final matching cost is not below this has no depth. (0, 2]. Default: 0.85.
+    /// Small changes of a tile's planes, and as many planes fitted to its pixels, tried at a visit. 0..=64. Default: 4.
+    pub refinements: u32,
+    /// Source views, the best of each tile, that hypotheses are compared with; passes with the neighbours' depth maps
+    /// take one more. 1..=64. Default: 3.
+    pub compared_views: u32,
+    /// A pixel whose final matching cost is not below this has no depth. (0, 2]. Default: 1.
     pub keep_cost: f32,
     /// Weight of the geometric term: cost added per pixel of disagreement, at most four. >= 0. Default: 0.1.
     pub geometric_weight: f32,
@@ -30,8 +57,9 @@ impl Default for StereoOptions {
             iterations: 3,
             geometric_iterations: 2,
             candidates: 6,
-            refine_views: 3,
-            keep_cost: 0.85,
+            refinements: 4,
+            compared_views: 3,
+            keep_cost: 1.0,
             geometric_weight: 0.1,
             seed: 0,
         }
@@ -39,6 +67,16 @@ impl Default for StereoOptions {
 }
 
 impl StereoOptions {
+    /// The options of a quality.
+    pub fn of(quality: Quality) -> Self {
+        let (candidates, refinements, compared_views) = match quality {
+            Quality::Draft => (3, 2, 2),
+            Quality::Normal => (6, 4, 3),
+            Quality::High => (8, 8, 4),
+        };
+        StereoOptions { candidates, refinements, compared_views, ..StereoOptions::default() }
+    }
+
     /// Checks the ranges stated at the fields.
     ///
     /// # Errors
@@ -49,7 +87,8 @@ impl StereoOptions {
             ("--iters", self.iterations, 1, 100),
             ("--geometric-iters", self.geometric_iterations, 0, 100),
             ("candidates", self.candidates, 1, 64),
-            ("refine views", self.refine_views, 1, 64),
+            ("refinements", self.refinements, 0, 64),
+            ("compared views", self.compared_views, 1, 64),
         ];
         for (name, value, low, high) in whole {
             if !(low..=high).contains(&value) {

@@ -24,13 +24,15 @@ pub(crate) struct Pass {
     pub(crate) iteration: u32,
     /// Which shift of the tile grid.
     pub(crate) shift: usize,
-    /// Candidates of each kind.
+    /// Planes of the tile's own pixels, and planes from beside it.
     pub(crate) candidates: usize,
+    /// Shaken planes, and fitted ones.
+    pub(crate) refinements: usize,
     /// Random planes tried on every tile.
     pub(crate) random: usize,
     /// Random planes tried on tiles that match badly.
     pub(crate) random_if_bad: usize,
-    /// Source views that shaken and fitted planes are compared with.
+    /// Source views that all planes but the first are compared with.
     pub(crate) views: usize,
     /// Whether the visit starts from planes of a coarser level whose costs mean little.
     pub(crate) fresh: bool,
@@ -100,6 +102,7 @@ impl<'a> Solver<'a> {
             }
             if k == 0 {
                 self.tile.rank_views();
+                self.tile.views = pass.views.min(self.level.sources.len());
             }
         }
         for k in 0..pass.candidates {
@@ -113,11 +116,10 @@ impl<'a> Solver<'a> {
             let p = candidates::random(self.level, rng);
             (self.kernels.try_plane)(&mut self.tile, self.level, p);
         }
-        self.tile.views = pass.views.min(self.level.sources.len());
-        for k in 0..pass.candidates {
+        for k in 0..pass.refinements {
             self.shake(pass, first, k, rng);
         }
-        for k in 0..pass.candidates {
+        for k in 0..pass.refinements {
             self.fit(first, k);
         }
     }

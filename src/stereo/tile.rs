@@ -17,8 +17,12 @@ pub(crate) const REACH: usize = 4;
 pub(crate) const WIN_W: usize = TILE_W + 2 * REACH;
 /// Rows of the tile and its window margin.
 pub(crate) const WIN_H: usize = TILE_H + 2 * REACH;
-/// Texels of a matching window.
-pub(crate) const TAPS: usize = 25;
+/// Columns of a matching window.
+pub(crate) const TAP_COLUMNS: usize = 5;
+/// Rows of a matching window, two by two; the last pair has one row only.
+pub(crate) const TAP_ROWS: usize = 3;
+/// Pairs of texels of a matching window, row by row.
+pub(crate) const TAPS: usize = TAP_COLUMNS * TAP_ROWS;
 /// Column and row of the tile's centre, where its planes are anchored.
 pub(crate) const CENTRE: (f32, f32) = ((TILE_W as f32 - 1.0) / 2.0, (TILE_H as f32 - 1.0) / 2.0);
 /// Cost of a view that cannot be compared: out of the image, or without texture.
@@ -30,6 +34,10 @@ pub(crate) const UNSEEN: f32 = 9.0;
 pub(crate) type Row = [f32; TILE_W];
 /// One value per column of the window.
 pub(crate) type WinRow = [f32; WIN_W];
+/// One pair of 16-bit numbers per pixel of a tile row.
+pub(crate) type Words = [u32; TILE_W];
+/// One pair per column of the window: a texel in the low half, the one two rows below it in the high half.
+pub(crate) type WinWords = [u32; WIN_W];
 /// One value per pixel of the tile.
 pub(crate) type TileMap = [Row; TILE_H];
 /// One value per pixel of the tile and its one-pixel surround: pixel (x, y) is at `[y + 1][x + 1]`.
@@ -38,10 +46,12 @@ pub(crate) type HaloMap = [WinRow; TILE_H + 2];
 /// The reference window and the statistics of every pixel's patch.
 #[repr(align(64))]
 pub(crate) struct Patch {
-    /// Grey levels 0..255 minus mid-grey.
+    /// Grey levels 0..255 minus mid-grey, in 1/64.
     pub(crate) texel: [WinRow; WIN_H],
-    /// Bilateral weight of every texel of every pixel's window; 0 outside the image.
-    pub(crate) weight: [[Row; TAPS]; TILE_H],
+    /// The same as pairs.
+    pub(crate) pairs: [WinWords; WIN_H],
+    /// Bilateral weights of the pairs of every pixel's window, 32767 = 1; 0 outside the image.
+    pub(crate) weight: [[Words; TAPS]; TILE_H],
     /// One over the sum of the weights.
     pub(crate) inverse_weight: TileMap,
     /// Weighted mean of the texels.
@@ -101,8 +111,8 @@ pub(crate) struct Sides {
 /// Scratch of one candidate.
 #[repr(align(64))]
 pub(crate) struct Scratch {
-    /// Source window warped by the candidate.
-    pub(crate) warped: [WinRow; WIN_H],
+    /// Source window warped by the candidate, about 1/64 grey levels from mid-grey.
+    pub(crate) warped: [WinWords; WIN_H],
     /// 1 where the warped sample lies inside the source.
     pub(crate) valid: [WinRow; WIN_H],
     /// Cost of the view at hand.
@@ -139,6 +149,7 @@ const ZERO_ROW: Row = [0.0; TILE_W];
 const ZERO_TILE: TileMap = [ZERO_ROW; TILE_H];
 const ZERO_HALO: HaloMap = [[0.0; WIN_W]; TILE_H + 2];
 const ZERO_WIN: [WinRow; WIN_H] = [[0.0; WIN_W]; WIN_H];
+const ZERO_WORDS: [WinWords; WIN_H] = [[0; WIN_W]; WIN_H];
 
 impl Tile {
     /// A tile of zeros on the heap.
@@ -148,7 +159,8 @@ impl Tile {
             y0: 0,
             patch: Patch {
                 texel: ZERO_WIN,
-                weight: [[[0.0; TILE_W]; TAPS]; TILE_H],
+                pairs: ZERO_WORDS,
+                weight: [[[0; TILE_W]; TAPS]; TILE_H],
                 inverse_weight: ZERO_TILE,
                 mean: ZERO_TILE,
                 norm: ZERO_TILE,
@@ -172,7 +184,7 @@ impl Tile {
                 sides: Sides { nx: ZERO_ROW, ny: ZERO_ROW, nz: ZERO_ROW, w: ZERO_ROW, on: ZERO_ROW },
             },
             scratch: Scratch {
-                warped: ZERO_WIN,
+                warped: ZERO_WORDS,
                 valid: ZERO_WIN,
                 cost: ZERO_TILE,
                 best: ZERO_TILE,

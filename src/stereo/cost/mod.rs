@@ -13,7 +13,12 @@ mod x86;
 use super::level::Level;
 use super::plane::InversePlane;
 use super::tile::Tile;
-use lanes::portable::Sixteen;
+
+/// Lanes of what every processor of the architecture has.
+#[cfg(target_arch = "x86_64")]
+type Baseline = lanes::sse2::Four;
+#[cfg(not(target_arch = "x86_64"))]
+type Baseline = lanes::portable::Sixteen;
 
 /// Instruction set used by the kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +27,7 @@ pub enum CpuLevel {
     Scalar,
     /// x86-64 with AVX2.
     Avx2,
-    /// x86-64 with AVX-512 F, BW, DQ and VL.
+    /// x86-64 with AVX-512 F, BW, DQ, VL, VNNI and VBMI: Ice Lake, Zen 4 and later.
     Avx512,
 }
 
@@ -45,6 +50,8 @@ impl CpuLevel {
                     && std::is_x86_feature_detected!("avx512bw")
                     && std::is_x86_feature_detected!("avx512dq")
                     && std::is_x86_feature_detected!("avx512vl")
+                    && std::is_x86_feature_detected!("avx512vnni")
+                    && std::is_x86_feature_detected!("avx512vbmi")
             }
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
@@ -98,10 +105,10 @@ impl Kernels {
             #[cfg(target_arch = "x86_64")]
             CpuLevel::Avx512 if level.is_supported() => x86::AVX512,
             _ => Kernels {
-                prepare: kernels::prepare::<Sixteen>,
-                begin: kernels::begin::<Sixteen>,
-                score_own: kernels::score_own::<Sixteen>,
-                try_plane: kernels::try_plane::<Sixteen>,
+                prepare: kernels::prepare::<Baseline>,
+                begin: kernels::begin::<Baseline>,
+                score_own: kernels::score_own::<Baseline>,
+                try_plane: kernels::try_plane::<Baseline>,
             },
         }
     }

@@ -48,7 +48,7 @@ macro_rules! compiled_for {
 }
 
 compiled_for!(avx2, Two, "avx2");
-compiled_for!(avx512, One, "avx2,avx512f,avx512bw,avx512dq,avx512vl");
+compiled_for!(avx512, One, "avx2,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni,avx512vbmi");
 
 /// Kernels for AVX2.
 pub(super) const AVX2: Kernels = avx2::KERNELS;

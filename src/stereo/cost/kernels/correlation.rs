@@ -1,83 +1,119 @@
 //! Bilaterally weighted zero-mean normalised cross-correlation, and the two best of several views.
 
-use super::{Lanes, cut};
-use crate::stereo::tile::{Patch, ROBUST_COST, Row, TILE_H, TileMap, WIN_H, WinRow};
+use super::{Lanes, Pairs};
+use crate::stereo::level::STEPS;
+use crate::stereo::tile::{
+    Patch, ROBUST_COST, Row, TAP_COLUMNS, TAP_ROWS, TAPS, TILE_H, TILE_W, TileMap, WIN_H, WinWords, Words,
+};
 
-/// Grey levels of a source sample: values are 65536 times the grey level.
-const SAMPLE: f32 = 65_536.0;
-/// Products of variances below this cannot be compared (grey levels², squared sample units).
-const FLAT: f32 = 1e-3 * SAMPLE * SAMPLE;
+/// Source samples per grey level, as [`Lanes::bilinear`] gives them.
+const SAMPLES: f32 = 255.0 * 255.0 / 2048.0;
+/// Products of variances below this cannot be compared: 0.001 grey levels⁴.
+const FLAT: f32 = 1e-3 * STEPS * STEPS * SAMPLES * SAMPLES;
 
-/// Weighted sums of a row of pixels over their windows: source, source squared, source times reference.
-pub(super) type Sums<L> = [L; 3];
+/// Rounded weights leave about this many times a window's mean in the variance of a window without texture.
+const ROUNDING: f32 = 1.0;
+/// Weighted sums over matching windows: source, source squared, source times reference.
+type Sums<P> = [P; 3];
+
+/// Weighted sums of a row of pixels as whole numbers.
+pub(super) type SumRows = [Words; 3];
 
 /// Correlation cost 0..2 of every pixel of the tile against the warped window.
 #[inline(always)]
-pub(super) fn of_tile<L: Lanes>(patch: &Patch, warped: &[WinRow; WIN_H], cost: &mut TileMap) {
-    match L::ROWS {
-        4 => of_rows::<L, 4>(patch, warped, cost),
-        2 => of_rows::<L, 2>(patch, warped, cost),
-        _ => of_rows::<L, 1>(patch, warped, cost),
-    }
-}
-
-/// Rows `y`, `y + 2`, … share the window rows they see, so `N` of them are summed together.
-#[inline(always)]
-fn of_rows<L: Lanes, const N: usize>(patch: &Patch, warped: &[WinRow; WIN_H], cost: &mut TileMap) {
-    let mut first = 0;
-    while first < TILE_H {
-        let mut sums = [[L::splat(0.0); 3]; N];
-        window_row::<L, N, 0>(patch, warped, first, &mut sums);
-        window_row::<L, N, 1>(patch, warped, first, &mut sums);
-        window_row::<L, N, 2>(patch, warped, first, &mut sums);
-        window_row::<L, N, 3>(patch, warped, first, &mut sums);
-        window_row::<L, N, 4>(patch, warped, first, &mut sums);
-        window_row::<L, N, 5>(patch, warped, first, &mut sums);
-        window_row::<L, N, 6>(patch, warped, first, &mut sums);
-        window_row::<L, N, 7>(patch, warped, first, &mut sums);
-        for (k, sums) in sums.into_iter().enumerate() {
-            let y = first + 2 * k;
-            finish(patch, y, sums).store(&mut cost[y]);
+pub(super) fn of_tile<L: Lanes>(patch: &Patch, warped: &[WinWords; WIN_H], cost: &mut TileMap) {
+    for first in 0..TILE_H / 2 {
+        let mut rows: [SumRows; 2] = [[[0; TILE_W]; 3]; 2];
+        two_rows::<L::Pairs, 0>(patch, warped, first, &mut rows);
+        if L::Pairs::WIDTH < 16 {
+            two_rows::<L::Pairs, 8>(patch, warped, first, &mut rows);
         }
-        // 0, 1 for four rows at a time; 0, 1, 4, 5 for two; every row for one
-        first += if N == 1 || first.is_multiple_of(2) { 1 } else { 2 * N - 1 };
+        if L::Pairs::WIDTH < 8 {
+            two_rows::<L::Pairs, 4>(patch, warped, first, &mut rows);
+            two_rows::<L::Pairs, 12>(patch, warped, first, &mut rows);
+        }
+        for (k, sums) in rows.iter().enumerate() {
+            let y = first + 4 * k;
+            finish::<L>(patch, y, sums).store(&mut cost[y]);
+        }
     }
 }
 
-/// Adds every second texel of window row `first + 2 R` to the rows that see it.
+/// Sums of rows `first` and `first + 4`, which share window rows, from column `X` on.
 #[inline(always)]
-fn window_row<L: Lanes, const N: usize, const R: usize>(
+fn two_rows<P: Pairs, const X: usize>(
     patch: &Patch,
-    warped: &[WinRow; WIN_H],
+    warped: &[WinWords; WIN_H],
     first: usize,
-    sums: &mut [Sums<L>; N],
+    to: &mut [SumRows; 2],
 ) {
-    if R >= N + 4 {
-        return;
-    }
-    let (source, reference) = (&warped[(first + 2 * R) % WIN_H], &patch.texel[(first + 2 * R) % WIN_H]);
-    for j in 0..5 {
-        let (v, t): (L, L) = (cut(source, 2 * j), cut(reference, 2 * j));
-        for (k, sums) in sums.iter_mut().enumerate() {
-            if R >= k && R - k < 5 {
-                let w = L::load(&patch.weight[(first + 2 * k) % TILE_H][5 * (R - k) + j]);
-                add(sums, v, t, w);
-            }
+    let mut sums = [[P::splat(0); 3]; 2];
+    window_rows::<P, X, 0>(patch, warped, first, &mut sums);
+    window_rows::<P, X, 1>(patch, warped, first, &mut sums);
+    window_rows::<P, X, 2>(patch, warped, first, &mut sums);
+    window_rows::<P, X, 3>(patch, warped, first, &mut sums);
+    for (sums, to) in sums.into_iter().zip(to) {
+        for (sum, to) in sums.into_iter().zip(to) {
+            sum.store(to, X);
         }
     }
 }
 
+/// Adds window rows `first + 4 G` and the ones below them.
 #[inline(always)]
-pub(super) fn add<L: Lanes>(sums: &mut Sums<L>, v: L, t: L, w: L) {
-    let vw = v * w;
-    sums[0] = sums[0] + vw;
-    sums[1] = sums[1] + v * vw;
-    sums[2] = sums[2] + t * vw;
+fn window_rows<P: Pairs, const X: usize, const G: usize>(
+    patch: &Patch,
+    warped: &[WinWords; WIN_H],
+    first: usize,
+    sums: &mut [Sums<P>; 2],
+) {
+    let row = (first + 4 * G) % WIN_H;
+    let [upper, lower] = sums;
+    for j in 0..TAP_COLUMNS {
+        let v = P::load(&warped[row], X + 2 * j);
+        let t = P::load(&patch.pairs[row], X + 2 * j);
+        if G < TAP_ROWS {
+            add(upper, v, t, P::load(&patch.weight[first % TILE_H][TAP_COLUMNS * G + j], X));
+        }
+        if G > 0 {
+            add(lower, v, t, P::load(&patch.weight[(first + 4) % TILE_H][TAP_COLUMNS * (G - 1) + j], X));
+        }
+    }
+}
+
+/// Correlation sums of row `y` with every pixel's own samples.
+#[inline(always)]
+pub(super) fn of_samples<L: Lanes>(patch: &Patch, y: usize, samples: &[Words; TAPS]) -> SumRows {
+    let mut out = [[0; TILE_W]; 3];
+    for x in (0..TILE_W).step_by(L::Pairs::WIDTH) {
+        let mut sums = [L::Pairs::splat(0); 3];
+        for (tap, samples) in samples.iter().enumerate() {
+            let (i, j) = (tap / TAP_COLUMNS, tap % TAP_COLUMNS);
+            let t = L::Pairs::load(&patch.pairs[y + 4 * i], x + 2 * j);
+            add(&mut sums, L::Pairs::load(samples, x), t, L::Pairs::load(&patch.weight[y][tap], x));
+        }
+        for (sum, to) in sums.into_iter().zip(&mut out) {
+            sum.store(to, x);
+        }
+    }
+    out
+}
+
+/// Adds pairs of texels of source and reference with their weights.
+#[inline(always)]
+fn add<P: Pairs>(sums: &mut Sums<P>, source: P, reference: P, weight: P) {
+    let weighted = weight.scaled(source);
+    sums[0] = sums[0].plus_dot(weighted, P::splat(0x0001_0001));
+    sums[1] = sums[1].plus_dot(weighted, source);
+    sums[2] = sums[2].plus_dot(weighted, reference);
 }
 
 /// Cost from the weighted sums of row `y`.
 #[inline(always)]
-pub(super) fn finish<L: Lanes>(patch: &Patch, y: usize, [sum, square, cross]: Sums<L>) -> L {
+pub(super) fn finish<L: Lanes>(patch: &Patch, y: usize, [sum, square, cross]: &SumRows) -> L {
+    let sum = L::from_whole(L::load_words(sum));
+    let square = L::from_whole(L::load_words(square));
+    let cross = L::from_whole(L::load_words(cross));
     let mean = sum * L::load(&patch.inverse_weight[y]);
     let norm = square - mean * sum;
     let covariance = cross - L::load(&patch.mean[y]) * sum;
@@ -85,8 +121,11 @@ pub(super) fn finish<L: Lanes>(patch: &Patch, y: usize, [sum, square, cross]: Su
     let flat = L::splat(FLAT);
     let correlation = (covariance / product.max(flat).sqrt()).min(L::splat(1.0));
     let cost = (L::splat(1.0) - correlation).min(L::splat(2.0));
-    L::select(flat.lt(product), cost, L::splat(ROBUST_COST))
+    let textured = L::both(flat.lt(product), (mean.abs() * L::splat(ROUNDING)).lt(norm));
+    L::select(textured, cost, L::splat(ROBUST_COST))
 }
+
+const _: () = assert!(TILE_H == 8 && WIN_H == 4 * (TAP_ROWS + 1));
 
 /// Mean of the two best costs; the best alone where no second source could be compared.
 #[inline(always)]

@@ -12,7 +12,7 @@ pub(super) use own::score_own;
 pub(super) use patch::prepare;
 pub(super) use smoothness::begin;
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Pairs};
 use crate::stereo::level::Level;
 use crate::stereo::plane::InversePlane;
 use crate::stereo::tile::{CENTRE, REACH, ROBUST_COST, Row, TILE_H, TILE_W, Tile, TileMap, UNSEEN, WinRow};

@@ -1,11 +1,13 @@
 //! Every pixel's own plane: nothing is shared, so an evaluation costs several times that of a shared plane.
 
-use super::correlation::{Sums, add, finish, merged};
+use super::correlation::{SumRows, finish, merged, of_samples};
 use super::geometric::geometric_term;
-use super::warp::{MIN_DEPTH_RATIO, clamped, texels};
-use super::{LANE, Lanes, cut};
+use super::warp::{FIXED, MIN_DEPTH_RATIO, clamped, texels};
+use super::{LANE, Lanes};
 use crate::stereo::level::{Level, Source};
-use crate::stereo::tile::{Patch, REACH, ROBUST_COST, TAPS, TILE_H, TILE_W, Tile, UNSEEN};
+use crate::stereo::tile::{
+    Patch, REACH, ROBUST_COST, TAP_COLUMNS, TAP_ROWS, TAPS, TILE_H, TILE_W, Tile, UNSEEN,
+};
 
 /// Matching cost of every pixel's own plane.
 #[inline(always)]
@@ -38,7 +40,7 @@ fn of_row<L: Lanes>(patch: &Patch, source: &Source, at: (f32, f32), planes: [L; 
         true => correlated::<L, true>(patch, source, &warps, y),
         false => correlated::<L, false>(patch, source, &warps, y),
     };
-    L::select(inside, finish(patch, y, sums), L::splat(ROBUST_COST))
+    L::select(inside, finish::<L>(patch, y, &sums), L::splat(ROBUST_COST))
 }
 
 /// Sums over the windows of row `y`; unless they are all `INSIDE` the source, samples are clamped.
@@ -48,21 +50,34 @@ fn correlated<L: Lanes, const INSIDE: bool>(
     source: &Source,
     warps: &WarpRow<L>,
     y: usize,
-) -> Sums<L> {
-    let mut sums: Sums<L> = [L::splat(0.0); 3];
-    for tap in 0..TAPS {
-        let (i, j) = (tap / 5 * 2, tap % 5 * 2);
-        let (mut u, mut v) = warps.near(j as f32 - REACH as f32, i as f32 - REACH as f32);
-        if !INSIDE {
-            (u, v, _) = clamped(source, u, v);
-        }
-        let t = cut(&patch.texel[y + i], j);
-        add(&mut sums, texels(source, u, v), t, L::load(&patch.weight[y][tap]));
+) -> SumRows {
+    let centre = sample::<L, INSIDE>(source, warps, 2, 2);
+    let shift = L::negated(centre);
+    let mut samples = [[0; TILE_W]; TAPS];
+    for (tap, samples) in samples.iter_mut().enumerate() {
+        let (i, j) = (tap / TAP_COLUMNS, tap % TAP_COLUMNS);
+        let below = if i + 1 < TAP_ROWS {
+            L::plus(sample::<L, INSIDE>(source, warps, 2 * i + 1, j), shift)
+        } else {
+            L::whole(0)
+        };
+        let here = L::plus(sample::<L, INSIDE>(source, warps, 2 * i, j), shift);
+        L::store_words(L::paired(here, below), samples);
     }
-    sums
+    of_samples::<L>(patch, y, &samples)
 }
 
-/// The homographies of a row of pixels, each anchored at its pixel: source pixel of an offset `(ox, oy)` is
+/// Samples of row `i`, column `j` of the matching windows.
+#[inline(always)]
+fn sample<L: Lanes, const INSIDE: bool>(source: &Source, warps: &WarpRow<L>, i: usize, j: usize) -> L::Bits {
+    let (mut u, mut v) = warps.near((2 * j) as f32 - REACH as f32, (2 * i) as f32 - REACH as f32);
+    if !INSIDE {
+        (u, v, _) = clamped(source, u, v);
+    }
+    texels::<L>(source, u.truncated(), v.truncated())
+}
+
+/// The homographies of a row of pixels, each anchored at its pixel: source pixel, in fixed point, of an offset `(ox, oy)` is
 /// `centre + (ox·d_dx + oy·d_dy) / z` with `z = 1 + ox·z_dx + oy·z_dy`.
 struct WarpRow<L: Lanes> {
     centre: [L; 2],
@@ -78,18 +93,22 @@ impl<L: Lanes> WarpRow<L> {
     #[inline(always)]
     fn new(Source { a, b, .. }: &Source, (x, y): (f32, f32), [w, wx, wy]: [L; 3]) -> Self {
         let column = L::splat(x) + L::load(&LANE);
-        let c = |r: usize| L::splat(a[r][0]) * column + L::splat(a[r][1] * y + a[r][2]) + L::splat(b[r]) * w;
-        let dx = |r: usize| L::splat(a[r][0]) + L::splat(b[r]) * wx;
-        let dy = |r: usize| L::splat(a[r][1]) + L::splat(b[r]) * wy;
-        let z = c(2);
-        let r = L::splat(1.0) / L::splat(1e-6).max(z);
-        let centre = [c(0) * r, c(1) * r];
+        let (mut c, mut dx, mut dy) = ([w; 3], [w; 3], [w; 3]);
+        for i in 0..3 {
+            c[i] = L::splat(a[i][0]) * column + L::splat(a[i][1] * y + a[i][2]) + L::splat(b[i]) * w;
+            dx[i] = L::splat(a[i][0]) + L::splat(b[i]) * wx;
+            dy[i] = L::splat(a[i][1]) + L::splat(b[i]) * wy;
+        }
+        let z = c[2];
+        let s = L::splat(1.0) / L::splat(1e-6).max(z);
+        let r = s * L::splat(FIXED);
+        let centre = [c[0] * r, c[1] * r];
         WarpRow {
             centre,
-            d_dx: [(dx(0) - centre[0] * dx(2)) * r, (dx(1) - centre[1] * dx(2)) * r],
-            d_dy: [(dy(0) - centre[0] * dy(2)) * r, (dy(1) - centre[1] * dy(2)) * r],
-            z_dx: dx(2) * r,
-            z_dy: dy(2) * r,
+            d_dx: [dx[0] * r - centre[0] * dx[2] * s, dx[1] * r - centre[1] * dx[2] * s],
+            d_dy: [dy[0] * r - centre[0] * dy[2] * s, dy[1] * r - centre[1] * dy[2] * s],
+            z_dx: dx[2] * s,
+            z_dy: dy[2] * s,
             z,
         }
     }
@@ -100,8 +119,8 @@ impl<L: Lanes> WarpRow<L> {
         let (ox, oy) = (L::splat(ox), L::splat(oy));
         let z = L::splat(1.0) + ox * self.z_dx + oy * self.z_dy;
         let r = L::splat(1.0) / z;
-        let along = |k: usize| self.centre[k] + (ox * self.d_dx[k] + oy * self.d_dy[k]) * r;
-        (along(0), along(1), z)
+        let (u, v) = self.along(ox, oy, r);
+        (u, v, z)
     }
 
     /// Source pixels of an offset within the matching window, where 1 / z is 1 − e + e² for any usable plane.
@@ -110,8 +129,15 @@ impl<L: Lanes> WarpRow<L> {
         let (ox, oy, one) = (L::splat(ox), L::splat(oy), L::splat(1.0));
         let e = ox * self.z_dx + oy * self.z_dy;
         let r = one - e * (one - e);
-        let along = |k: usize| self.centre[k] + (ox * self.d_dx[k] + oy * self.d_dy[k]) * r;
-        (along(0), along(1))
+        self.along(ox, oy, r)
+    }
+
+    #[inline(always)]
+    fn along(&self, ox: L, oy: L, r: L) -> (L, L) {
+        let [u, v] = self.centre;
+        let [u_dx, v_dx] = self.d_dx;
+        let [u_dy, v_dy] = self.d_dy;
+        (u + (ox * u_dx + oy * u_dy) * r, v + (ox * v_dx + oy * v_dy) * r)
     }
 
     /// Where the whole matching window lies inside the source and in front of it.

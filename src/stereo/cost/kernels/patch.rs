@@ -1,15 +1,17 @@
 //! The reference side: bilateral weights and statistics of every pixel's patch.
 
 use super::{Lanes, cut};
-use crate::stereo::level::Level;
-use crate::stereo::tile::{Patch, REACH, TAPS, TILE_H, TILE_W, Tile, WIN_H, WIN_W, WinRow};
+use crate::stereo::level::{Level, STEPS, Weighting};
+use crate::stereo::tile::{Patch, REACH, TAP_COLUMNS, TAPS, TILE_H, TILE_W, Tile, WIN_H, WIN_W, WinRow};
 
-/// 1 / (2 σ²) of the grey-level difference, σ = 0.068 of the range.
-const GREY_FALLOFF: f32 = 109.0 / (255.0 * 255.0);
-/// 1 / (2 σ²) of the distance in pixels, σ = 3.
-const SPACE_FALLOFF: f32 = 1.0 / 18.0;
+/// The largest weight as a 16-bit number.
+const FULL_WEIGHT: f32 = 32_767.0;
+/// What a 16-bit weight counts in units of products, as [`Lanes::scaled`] multiplies.
+const WEIGHT_UNIT: f32 = 1.0 / 32_768.0;
+/// Rows of a matching window.
+const WINDOW_ROWS: usize = TAP_COLUMNS;
 /// How fast the prior from the coarser level fades with texture.
-const PRIOR_FALLOFF: f32 = 109.0 / (255.0 * 255.0);
+const PRIOR_FALLOFF: f32 = 109.0 / (255.0 * 255.0 * STEPS * STEPS);
 
 /// Bilateral weights and patch statistics of every pixel of the tile.
 #[inline(always)]
@@ -19,7 +21,7 @@ pub(in crate::stereo::cost) fn prepare<L: Lanes>(tile: &mut Tile, level: &Level)
     let interior =
         x0 >= reach && y0 >= reach && x0 + (TILE_W as i32) + reach <= w && y0 + (TILE_H as i32) + reach <= h;
     if interior {
-        (0..TILE_H).for_each(|y| row::<L, true>(&mut tile.patch, &tile.scratch.valid, y));
+        (0..TILE_H).for_each(|y| row::<L, true>(&mut tile.patch, &tile.scratch.valid, level.weighting, y));
     } else {
         for (r, row) in tile.scratch.valid.iter_mut().enumerate() {
             for (c, v) in row.iter_mut().enumerate() {
@@ -27,8 +29,9 @@ pub(in crate::stereo::cost) fn prepare<L: Lanes>(tile: &mut Tile, level: &Level)
                 *v = if x >= 0 && y >= 0 && x < w && y < h { 1.0 } else { 0.0 };
             }
         }
-        (0..TILE_H).for_each(|y| row::<L, false>(&mut tile.patch, &tile.scratch.valid, y));
+        (0..TILE_H).for_each(|y| row::<L, false>(&mut tile.patch, &tile.scratch.valid, level.weighting, y));
     }
+    (0..WIN_H).for_each(|y| pair_up::<L>(&mut tile.patch, y));
     let (patch, belief) = (&tile.patch, &mut tile.belief);
     for y in 0..TILE_H {
         let k = L::bell64(L::load(&patch.norm[y]) * L::splat(PRIOR_FALLOFF));
@@ -39,30 +42,59 @@ pub(in crate::stereo::cost) fn prepare<L: Lanes>(tile: &mut Tile, level: &Level)
 
 /// Row `y`; unless the tile is `INTERIOR`, texels that are not `inside` the image weigh nothing.
 #[inline(always)]
-fn row<L: Lanes, const INTERIOR: bool>(patch: &mut Patch, inside: &[WinRow; WIN_H], y: usize) {
+fn row<L: Lanes, const INTERIOR: bool>(
+    patch: &mut Patch,
+    inside: &[WinRow; WIN_H],
+    weighting: Weighting,
+    y: usize,
+) {
+    let grey = L::splat(weighting.grey / (STEPS * STEPS));
     let centre: L = cut(&patch.texel[y + REACH], REACH);
     let [mut sum, mut first, mut second] = [L::splat(0.0); 3];
-    for tap in 0..TAPS {
-        let (i, j) = (tap / 5 * 2, tap % 5 * 2);
-        let (dy, dx) = (i as f32 - 4.0, j as f32 - 4.0);
-        let t: L = cut(&patch.texel[y + i], j);
-        let d = t - centre;
-        let away = d * d * L::splat(GREY_FALLOFF) + L::splat((dx * dx + dy * dy) * SPACE_FALLOFF);
-        let mut w = L::bell64(away);
-        if !INTERIOR {
-            w = w * cut(&inside[y + i], j);
+    for pair in 0..TAPS {
+        let (i, j) = (pair / TAP_COLUMNS * 4, pair % TAP_COLUMNS * 2);
+        let mut halves = [L::whole(0); 2];
+        for (below, half) in halves.iter_mut().enumerate().take(WINDOW_ROWS - i / 2) {
+            let i = i + 2 * below;
+            let (dy, dx) = (i as f32 - REACH as f32, j as f32 - REACH as f32);
+            let t: L = cut(&patch.texel[y + i], j);
+            let d = t - centre;
+            let away = d * d * grey + L::splat((dx * dx + dy * dy) * weighting.space);
+            let mut w = L::bell64(away);
+            if !INTERIOR {
+                w = w * cut(&inside[y + i], j);
+            }
+            *half = (w * L::splat(FULL_WEIGHT) + L::splat(0.5)).truncated();
+            let w = L::from_whole(*half) * L::splat(WEIGHT_UNIT);
+            let wt = w * t;
+            sum = sum + w;
+            first = first + wt;
+            second = second + wt * t;
         }
-        w.store(&mut patch.weight[y][tap]);
-        let wt = w * t;
-        sum = sum + w;
-        first = first + wt;
-        second = second + wt * t;
+        let [low, high] = halves;
+        L::store_words(
+            L::paired(L::shifted_left::<16>(low), L::shifted_left::<16>(high)),
+            &mut patch.weight[y][pair],
+        );
     }
     let inverse = L::splat(1.0) / sum.max(L::splat(1e-12));
     let mean = first * inverse;
     inverse.store(&mut patch.inverse_weight[y]);
     mean.store(&mut patch.mean[y]);
     (second - first * mean).max(L::splat(0.0)).store(&mut patch.norm[y]);
+}
+
+/// Packs window row `y` with the one two rows below it.
+#[inline(always)]
+fn pair_up<L: Lanes>(patch: &mut Patch, y: usize) {
+    for at in [0, WIN_W - TILE_W] {
+        let low = L::shifted_left::<16>(cut::<L>(&patch.texel[y], at).truncated());
+        let high = L::shifted_left::<16>(cut::<L>(&patch.texel[(y + 2) % WIN_H], at).truncated());
+        let pairs = L::paired(low, high);
+        if let Some(to) = patch.pairs[y][at..].first_chunk_mut() {
+            L::store_words(pairs, to);
+        }
+    }
 }
 
 const _: () = assert!(WIN_W >= TILE_W + 2 * REACH);

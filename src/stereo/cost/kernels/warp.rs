@@ -3,15 +3,23 @@
 use super::Lanes;
 use crate::stereo::level::Source;
 use crate::stereo::plane::InversePlane;
-use crate::stereo::tile::{CENTRE, Row, Scratch, TILE_W, WIN_H, WIN_W};
+use crate::stereo::tile::{CENTRE, Row, Scratch, TILE_W, WIN_H, WIN_W, WinWords};
 
 /// Depth ratio, corner of a window to its centre, below which a window is behind or beside the source.
 pub(super) const MIN_DEPTH_RATIO: f32 = 0.3;
 /// Half the extent of the window.
 const HALF: (f32, f32) = ((WIN_W as f32 - 1.0) / 2.0, (WIN_H as f32 - 1.0) / 2.0);
-/// Change of the depth ratio within the window up to which its inverse is a short series: the error, in pixels, is
-/// below a window's half extent times this to the fourth power.
-const SERIES: f32 = 0.05;
+/// Change of the depth ratio within the window up to which a warp is quadratic: the error, in pixels, is below a window's
+/// half extent times the square of this.
+const SMOOTH: f32 = 0.03;
+/// Steps per pixel of fixed-point source pixels.
+pub(super) const FIXED: f32 = 65_536.0;
+/// Added to the extent of footprints for rounding, in pixels.
+const SLACK: f32 = 0.02;
+/// Columns of the window in one vector, of two rows.
+const COLUMNS: usize = TILE_W / 2;
+const LANE_X: Row = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+const LANE_Y: Row = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
 
 /// How much of a warped window lies inside the source.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -93,10 +101,20 @@ impl Warp {
         }
     }
 
+    /// Source pixels, in fixed point, of eight columns of two rows of the window.
+    #[inline(always)]
+    fn lanes<L: Lanes>(&self, c: usize, k: usize) -> (L, L) {
+        let (ox, oy) = offsets::<L>(c, k);
+        let r = L::splat(1.0) / (L::splat(1.0) + ox * L::splat(self.z_dx) + oy * L::splat(self.z_dy));
+        let du = ox * L::splat(self.du_dx * FIXED) + oy * L::splat(self.du_dy * FIXED);
+        let dv = ox * L::splat(self.dv_dx * FIXED) + oy * L::splat(self.dv_dy * FIXED);
+        (L::splat(self.u * FIXED) + du * r, L::splat(self.v * FIXED) + dv * r)
+    }
+
     /// Whether the depth ratio hardly changes within the window.
     #[inline(always)]
-    fn nearly_affine(&self) -> bool {
-        self.z_dx.abs() * HALF.0 + self.z_dy.abs() * HALF.1 < SERIES
+    fn nearly_quadratic(&self) -> bool {
+        self.z_dx.abs() * HALF.0 + self.z_dy.abs() * HALF.1 < SMOOTH
     }
 }
 
@@ -113,71 +131,233 @@ pub(super) fn warp<L: Lanes>(
     let Some(m) = Warp::new(&source.a, &source.b, xc, yc, plane) else { return Coverage::None };
     let (max_u, max_v) = (source.width as f32 - 2.0, source.height as f32 - 2.0);
     let coverage = if max_u < 1.0 || max_v < 1.0 { Coverage::None } else { m.coverage(max_u, max_v) };
-    match (coverage, m.nearly_affine()) {
+    match (coverage, m.nearly_quadratic()) {
         (Coverage::None, _) => {}
-        (Coverage::Whole, true) => sample::<L, true, true>(source, &m, scratch),
-        (Coverage::Whole, false) => sample::<L, true, false>(source, &m, scratch),
-        (Coverage::Part, _) => sample::<L, false, false>(source, &m, scratch),
+        (Coverage::Whole, true) => match Footprint::rows::<L>(&m) {
+            4 => smooth::<L, 4>(source, &m, scratch),
+            8 => smooth::<L, 8>(source, &m, scratch),
+            _ => smooth::<L, 0>(source, &m, scratch),
+        },
+        (Coverage::Whole, false) => sample::<L, true>(source, &m, scratch),
+        (Coverage::Part, _) => sample::<L, false>(source, &m, scratch),
     }
     coverage
 }
 
-/// Samples the window, 16 texels at a time in raster order; unless the `WHOLE` window is inside, samples are clamped
-/// and marked.
+/// Samples the window; unless the `WHOLE` window is inside, samples are clamped and marked.
+///
+/// Sixteen texels at a time: eight columns of two rows, then of the next two rows, so that rows pair up lane by lane.
 #[inline(always)]
-fn sample<L: Lanes, const WHOLE: bool, const SERIES: bool>(source: &Source, m: &Warp, scratch: &mut Scratch) {
-    let (warped, _) = scratch.warped.as_flattened_mut().as_chunks_mut::<TILE_W>();
-    let (valid, _) = scratch.valid.as_flattened_mut().as_chunks_mut::<TILE_W>();
-    let one = L::splat(1.0);
-    for (((ox, oy), out), valid) in OFFSET_X.iter().zip(&OFFSET_Y).zip(warped).zip(valid) {
-        let (ox, oy) = (L::load(ox), L::load(oy));
-        let e = ox * L::splat(m.z_dx) + oy * L::splat(m.z_dy);
-        // 1 / (1 + e)
-        let r = if SERIES { one - e * (one - e * (one - e)) } else { one / (one + e) };
-        let mut u = L::splat(m.u) + (ox * L::splat(m.du_dx) + oy * L::splat(m.du_dy)) * r;
-        let mut v = L::splat(m.v) + (ox * L::splat(m.dv_dx) + oy * L::splat(m.dv_dy)) * r;
-        if !WHOLE {
-            let inside;
-            (u, v, inside) = clamped(source, u, v);
-            L::select(inside, one, L::splat(0.0)).store(valid);
+fn sample<L: Lanes, const WHOLE: bool>(source: &Source, m: &Warp, scratch: &mut Scratch) {
+    let shift = L::whole(source.level_at(m.u, m.v).wrapping_neg());
+    for c in 0..WIN_W / COLUMNS {
+        let mut above = L::whole(0);
+        for k in 0..WIN_H / 2 {
+            let (mut u, mut v) = m.lanes::<L>(c, k);
+            if !WHOLE {
+                let inside;
+                (u, v, inside) = clamped(source, u, v);
+                let mut marks = [0.0; TILE_W];
+                L::select(inside, L::splat(1.0), L::splat(0.0)).store(&mut marks);
+                for (row, marks) in scratch.valid[2 * k..].iter_mut().zip(marks.chunks_exact(COLUMNS)) {
+                    row[c * COLUMNS..][..COLUMNS].copy_from_slice(marks);
+                }
+            }
+            let texels = L::plus(texels::<L>(source, u.truncated(), v.truncated()), shift);
+            if k > 0 {
+                put::<L>(L::paired(above, texels), &mut scratch.warped[2 * k - 2..], c);
+            }
+            above = texels;
         }
-        texels(source, u, v).store(out);
+        put::<L>(L::paired(above, L::whole(0)), &mut scratch.warped[WIN_H - 2..], c);
     }
 }
 
-/// Source pixels moved inside, and which were there before.
+/// Samples a window that is wholly inside by a warp that is quadratic in the offset. Sixteen texels lie within `ROWS`
+/// rows of the source, 0 if that is not known.
+#[inline(always)]
+fn smooth<L: Lanes, const ROWS: usize>(source: &Source, m: &Warp, scratch: &mut Scratch) {
+    let shift = L::whole(source.level_at(m.u, m.v).wrapping_neg());
+    let low =
+        [Footprint::of(m, m.du_dx, m.du_dy).low_fixed(), Footprint::of(m, m.dv_dx, m.dv_dy).low_fixed()];
+    for c in 0..WIN_W / COLUMNS {
+        let mut column = Column::<L>::new(m, c);
+        let mut corner = column.first_lane();
+        let mut above = L::whole(0);
+        for k in 0..WIN_H / 2 {
+            let (u, v) = (column.at[0], column.at[1]);
+            let texels = if ROWS == 0 {
+                texels::<L>(source, u, v)
+            } else {
+                let [x, y] = [0, 1].map(|i| (corner.at[i] + low[i]).max(0) as u32 >> 16);
+                let memory = source.bytes.get(y as usize * source.width + x as usize..).unwrap_or(&[]);
+                let (du, dv) = (
+                    L::plus(u, L::whole((x << 16).wrapping_neg())),
+                    L::plus(v, L::whole((y << 16).wrapping_neg())),
+                );
+                L::bilinear(L::lookup::<ROWS>(memory, source.width, du, dv), u, v)
+            };
+            let texels = L::plus(texels, shift);
+            column.advance();
+            corner.advance();
+            if k > 0 {
+                put::<L>(L::paired(above, texels), &mut scratch.warped[2 * k - 2..], c);
+            }
+            above = texels;
+        }
+        put::<L>(L::paired(above, L::whole(0)), &mut scratch.warped[WIN_H - 2..], c);
+    }
+}
+
+/// How far source pixels of eight columns of two rows can be from the first one, one coordinate.
+struct Footprint {
+    low: f32,
+    high: f32,
+}
+
+impl Footprint {
+    /// Of `centre + (ox·dx + oy·dy)·(1 − e)`.
+    #[inline(always)]
+    fn of(m: &Warp, dx: f32, dy: f32) -> Self {
+        let (zx, zy) = (m.z_dx.abs(), m.z_dy.abs());
+        let (e, far) = (zx * HALF.0 + zy * HALF.1, dx.abs() * HALF.0 + dy.abs() * HALF.1);
+        let (bend_x, bend_y) = (dx.abs() * e + far * zx, dy.abs() * e + far * zy);
+        let reach = (COLUMNS - 1) as f32;
+        Footprint {
+            low: reach * (dx - bend_x).min(0.0) + (dy - bend_y).min(0.0),
+            high: reach * (dx + bend_x).max(0.0) + (dy + bend_y).max(0.0),
+        }
+    }
+
+    #[inline(always)]
+    fn extent(&self) -> f32 {
+        self.high - self.low + SLACK
+    }
+
+    #[inline(always)]
+    fn low_fixed(&self) -> i32 {
+        ((self.low - 0.5 * SLACK) * FIXED) as i32
+    }
+
+    /// Rows of sixteen source pixels that hold sixteen texels and their neighbours: 4, 8, or 0 if they do not.
+    #[inline(always)]
+    fn rows<L: Lanes>(m: &Warp) -> usize {
+        if !L::LOOKUP || Footprint::of(m, m.du_dx, m.du_dy).extent() > 14.0 {
+            return 0;
+        }
+        match Footprint::of(m, m.dv_dx, m.dv_dy).extent() {
+            rows if rows < 2.0 => 4,
+            rows if rows < 6.0 => 8,
+            _ => 0,
+        }
+    }
+}
+
+/// Writes eight columns of two rows.
+#[inline(always)]
+fn put<L: Lanes>(words: L::Bits, rows: &mut [WinWords], c: usize) {
+    if let [first, second, ..] = rows
+        && let Some(first) = first[c * COLUMNS..].first_chunk_mut()
+        && let Some(second) = second[c * COLUMNS..].first_chunk_mut()
+    {
+        L::store_halves(words, first, second);
+    }
+}
+
+/// Source pixels of eight columns of the window, two rows after two rows, by second differences.
+struct Column<L: Lanes> {
+    at: [L::Bits; 2],
+    step: [L::Bits; 2],
+    bend: [L::Bits; 2],
+}
+
+impl<L: Lanes> Column<L> {
+    #[inline(always)]
+    fn new(m: &Warp, c: usize) -> Self {
+        let (ox, oy) = offsets::<L>(c, 0);
+        let e = ox * L::splat(m.z_dx) + oy * L::splat(m.z_dy);
+        Column {
+            at: [
+                Self::start(m.u, m.du_dx, m.du_dy, ox, oy, e),
+                Self::start(m.v, m.dv_dx, m.dv_dy, ox, oy, e),
+            ],
+            step: [Self::step_of(m, m.du_dx, m.du_dy, ox, oy), Self::step_of(m, m.dv_dx, m.dv_dy, ox, oy)],
+            bend: [m.du_dy, m.dv_dy].map(|dy| L::splat(-8.0 * dy * m.z_dy * FIXED).truncated()),
+        }
+    }
+
+    /// `centre + (ox·dx + oy·dy)·(1 − e)`.
+    #[inline(always)]
+    fn start(centre: f32, dx: f32, dy: f32, ox: L, oy: L, e: L) -> L::Bits {
+        let straight = ox * L::splat(dx * FIXED) + oy * L::splat(dy * FIXED);
+        (L::splat(centre * FIXED) + straight * (L::splat(1.0) - e)).truncated()
+    }
+
+    /// The change of that to the next pair of rows.
+    #[inline(always)]
+    fn step_of(m: &Warp, dx: f32, dy: f32, ox: L, oy: L) -> L::Bits {
+        let mixed = 2.0 * (dx * m.z_dy + dy * m.z_dx);
+        let square = 4.0 * dy * m.z_dy;
+        let level = L::splat((2.0 * dy - square) * FIXED);
+        (level - ox * L::splat(mixed * FIXED) - oy * L::splat(square * FIXED)).truncated()
+    }
+
+    #[inline(always)]
+    fn advance(&mut self) {
+        for i in 0..2 {
+            self.at[i] = L::plus(self.at[i], self.step[i]);
+            self.step[i] = L::plus(self.step[i], self.bend[i]);
+        }
+    }
+
+    #[inline(always)]
+    fn first_lane(&self) -> FirstLane {
+        FirstLane {
+            at: self.at.map(|v| L::first(v) as i32),
+            step: self.step.map(|v| L::first(v) as i32),
+            bend: self.bend.map(|v| L::first(v) as i32),
+        }
+    }
+}
+
+/// The first lane of a [`Column`].
+struct FirstLane {
+    at: [i32; 2],
+    step: [i32; 2],
+    bend: [i32; 2],
+}
+
+impl FirstLane {
+    #[inline(always)]
+    fn advance(&mut self) {
+        for i in 0..2 {
+            self.at[i] = self.at[i].wrapping_add(self.step[i]);
+            self.step[i] = self.step[i].wrapping_add(self.bend[i]);
+        }
+    }
+}
+
+/// Offsets from the window's centre of eight columns of two rows.
+#[inline(always)]
+fn offsets<L: Lanes>(c: usize, k: usize) -> (L, L) {
+    let x = L::load(&LANE_X) + L::splat((c * COLUMNS) as f32 - HALF.0);
+    let y = L::load(&LANE_Y) + L::splat((2 * k) as f32 - HALF.1);
+    (x, y)
+}
+
+/// Source pixels moved inside, and which were there before; in fixed point.
 #[inline(always)]
 pub(super) fn clamped<L: Lanes>(source: &Source, u: L, v: L) -> (L, L, L::Mask) {
-    let one = L::splat(1.0);
-    let ku = one.max(u).min(L::splat(source.width as f32 - 2.0));
-    let kv = one.max(v).min(L::splat(source.height as f32 - 2.0));
+    let one = L::splat(FIXED);
+    let ku = one.max(u).min(L::splat((source.width as f32 - 2.0) * FIXED));
+    let kv = one.max(v).min(L::splat((source.height as f32 - 2.0) * FIXED));
     let off = (ku - u).abs() + (kv - v).abs();
     (ku, kv, off.le(L::splat(0.0)))
 }
 
-/// Bilinear samples of the source, 65536 per grey level, mid-grey is 0.
+/// Bilinear samples of the source at fixed-point pixels, in the high halves: about 1/64 grey levels from mid-grey.
 #[inline(always)]
-pub(super) fn texels<L: Lanes>(source: &Source, u: L, v: L) -> L {
-    let (fu, iu) = u.fraction_and_whole();
-    let (fv, iv) = v.fraction_and_whole();
-    let index = L::row_major(iu, iv, source.width);
-    let (left, right) = L::fetch(&source.pairs, index);
-    let (left, right) = (L::lerp_halves(left, fv), L::lerp_halves(right, fv));
-    left + fu * (right - left)
-}
-
-/// Column offsets of the window's texels from its centre, in raster order.
-const OFFSET_X: [Row; WIN_W * WIN_H / TILE_W] = offsets(true);
-/// Row offsets.
-const OFFSET_Y: [Row; WIN_W * WIN_H / TILE_W] = offsets(false);
-
-const fn offsets(columns: bool) -> [Row; WIN_W * WIN_H / TILE_W] {
-    let mut out = [[0.0; TILE_W]; WIN_W * WIN_H / TILE_W];
-    let mut i = 0;
-    while i < WIN_W * WIN_H {
-        let (x, y) = ((i % WIN_W) as f32 - HALF.0, (i / WIN_W) as f32 - HALF.1);
-        out[i / TILE_W][i % TILE_W] = if columns { x } else { y };
-        i += 1;
-    }
-    out
+pub(super) fn texels<L: Lanes>(source: &Source, u: L::Bits, v: L::Bits) -> L::Bits {
+    let index = L::place(u, v, source.width as u32);
+    L::bilinear(L::gather(&source.quads, index), u, v)
 }

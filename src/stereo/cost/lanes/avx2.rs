@@ -6,8 +6,8 @@
 //! Loads and stores go through references; a gather's indices are held below the length of its slice.
 #![allow(unsafe_code)]
 
-use super::{LERP_STEPS, Lanes, MAGIC, MAGIC_BITS};
-use crate::stereo::tile::Row;
+use super::{Lanes, Pairs};
+use crate::stereo::tile::{Row, Words};
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -39,7 +39,7 @@ operator!(Div, div, _mm256_div_ps);
 impl Lanes for Two {
     type Bits = Bits;
     type Mask = (__m256, __m256);
-    const ROWS: usize = 2;
+    type Pairs = EightPairs;
 
     #[inline(always)]
     fn splat(v: f32) -> Self {
@@ -141,8 +141,9 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
-    fn times(a: Bits, b: Bits) -> Bits {
-        unsafe { (_mm256_mullo_epi32(a.0, b.0), _mm256_mullo_epi32(a.1, b.1)) }
+    fn inverted(a: Bits) -> Bits {
+        let ones = Self::whole(!0);
+        unsafe { (_mm256_xor_si256(a.0, ones.0), _mm256_xor_si256(a.1, ones.1)) }
     }
 
     #[inline(always)]
@@ -170,18 +171,131 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
-    fn lerp_halves(words: Bits, fraction: Self) -> Self {
+    fn load_words(words: &Words) -> Bits {
+        // SAFETY: there are sixteen words.
         unsafe {
-            let t = (fraction * Self::splat(LERP_STEPS) + Self::splat(MAGIC)).to_bits();
-            let t = Self::plus(t, Self::whole(MAGIC_BITS.wrapping_neg()));
-            let steps = Self::whole(LERP_STEPS as u32);
-            let down = (_mm256_sub_epi32(steps.0, t.0), _mm256_sub_epi32(steps.1, t.1));
-            let weights = Self::plus(Self::shifted_left::<16>(t), down);
-            Two(
-                _mm256_cvtepi32_ps(_mm256_madd_epi16(words.0, weights.0)),
-                _mm256_cvtepi32_ps(_mm256_madd_epi16(words.1, weights.1)),
-            )
+            (_mm256_loadu_si256(words.as_ptr().cast()), _mm256_loadu_si256(words.as_ptr().add(8).cast()))
         }
+    }
+
+    #[inline(always)]
+    fn store_words(words: Bits, to: &mut Words) {
+        // SAFETY: there are sixteen words.
+        unsafe {
+            _mm256_storeu_si256(to.as_mut_ptr().cast(), words.0);
+            _mm256_storeu_si256(to.as_mut_ptr().add(8).cast(), words.1);
+        }
+    }
+
+    #[inline(always)]
+    fn store_halves(words: Bits, first: &mut [u32; 8], second: &mut [u32; 8]) {
+        // SAFETY: each half has eight words.
+        unsafe {
+            _mm256_storeu_si256(first.as_mut_ptr().cast(), words.0);
+            _mm256_storeu_si256(second.as_mut_ptr().cast(), words.1);
+        }
+    }
+
+    #[inline(always)]
+    fn truncated(self) -> Bits {
+        unsafe { (_mm256_cvttps_epi32(self.0), _mm256_cvttps_epi32(self.1)) }
+    }
+
+    #[inline(always)]
+    fn from_whole(bits: Bits) -> Self {
+        unsafe { Two(_mm256_cvtepi32_ps(bits.0), _mm256_cvtepi32_ps(bits.1)) }
+    }
+
+    #[inline(always)]
+    fn place(column: Bits, row: Bits, width: u32) -> Bits {
+        let factors = Self::whole(1 | width << 16);
+        let both = Self::paired(column, row);
+        unsafe { (_mm256_madd_epi16(both.0, factors.0), _mm256_madd_epi16(both.1, factors.1)) }
+    }
+
+    #[inline(always)]
+    fn gather(memory: &[u32], index: Bits) -> Bits {
+        let Some(last) = memory.len().checked_sub(1) else { return Self::whole(0) };
+        let last = Self::whole(last.min(i32::MAX as usize) as u32);
+        // SAFETY: after the minimum every index is one of `memory`, and fits a positive i32.
+        unsafe {
+            let (a, b) = (_mm256_min_epu32(index.0, last.0), _mm256_min_epu32(index.1, last.1));
+            let base = memory.as_ptr().cast();
+            (_mm256_i32gather_epi32::<4>(base, a), _mm256_i32gather_epi32::<4>(base, b))
+        }
+    }
+
+    #[inline(always)]
+    fn first(bits: Bits) -> u32 {
+        unsafe { _mm256_cvtsi256_si32(bits.0) as u32 }
+    }
+
+    #[inline(always)]
+    fn bilinear(quad: Bits, column: Bits, row: Bits) -> Bits {
+        (bilinear8(quad.0, column.0, row.0), bilinear8(quad.1, column.1, row.1))
+    }
+
+    #[inline(always)]
+    fn paired(low: Bits, high: Bits) -> Bits {
+        unsafe {
+            let (a, b) = (_mm256_srli_epi32::<16>(low.0), _mm256_srli_epi32::<16>(low.1));
+            (_mm256_blend_epi16::<0xAA>(a, high.0), _mm256_blend_epi16::<0xAA>(b, high.1))
+        }
+    }
+}
+
+/// Eight pairs in one register.
+#[derive(Clone, Copy)]
+pub(crate) struct EightPairs(__m256i);
+
+impl Pairs for EightPairs {
+    const WIDTH: usize = 8;
+
+    #[inline(always)]
+    fn splat(pair: u32) -> Self {
+        EightPairs(unsafe { _mm256_set1_epi32(pair as i32) })
+    }
+
+    #[inline(always)]
+    fn load(row: &[u32], at: usize) -> Self {
+        let row: &[u32; 8] = row.get(at..).and_then(|r| r.first_chunk()).unwrap_or(&[0; 8]);
+        // SAFETY: the reference is to eight words.
+        EightPairs(unsafe { _mm256_loadu_si256(row.as_ptr().cast()) })
+    }
+
+    #[inline(always)]
+    fn store(self, row: &mut Words, at: usize) {
+        if let Some(to) = row.get_mut(at..).and_then(|r| r.first_chunk_mut::<8>()) {
+            // SAFETY: the reference is to eight words.
+            unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), self.0) }
+        }
+    }
+
+    #[inline(always)]
+    fn scaled(self, b: Self) -> Self {
+        EightPairs(unsafe { _mm256_mulhrs_epi16(self.0, b.0) })
+    }
+
+    #[inline(always)]
+    fn plus_dot(self, a: Self, b: Self) -> Self {
+        EightPairs(unsafe { _mm256_add_epi32(self.0, _mm256_madd_epi16(a.0, b.0)) })
+    }
+}
+
+/// [`Lanes::bilinear`] of one register.
+#[inline(always)]
+fn bilinear8(quad: __m256i, column: __m256i, row: __m256i) -> __m256i {
+    const SECOND: i32 = 0x0101_0101;
+    const EVEN: i32 = 0x8001_8001_u32 as i32;
+    unsafe {
+        let lane = _mm256_set1_epi64x(0x0404_0404_0000_0000);
+        let lane =
+            _mm256_add_epi8(lane, _mm256_setr_epi64x(0, 0x0808_0808_0808_0808, 0, 0x0808_0808_0808_0808));
+        let across = _mm256_shuffle_epi8(column, _mm256_or_si256(lane, _mm256_set1_epi32(SECOND)));
+        let down = _mm256_shuffle_epi8(row, _mm256_or_si256(lane, _mm256_set1_epi32(EVEN)));
+        let across = _mm256_xor_si256(across, _mm256_set1_epi32(0x00ff_00ff));
+        let down = _mm256_xor_si256(down, _mm256_set1_epi32(0x0000_00ff));
+        _mm256_slli_epi32::<5>(_mm256_madd_epi16(_mm256_maddubs_epi16(across, quad), down))
     }
 }
 

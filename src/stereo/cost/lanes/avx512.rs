@@ -6,8 +6,8 @@
 //! them enabled. Loads and stores go through references; a gather's indices are held below the length of its slice.
 #![allow(unsafe_code)]
 
-use super::{LERP_STEPS, Lanes, MAGIC, MAGIC_BITS};
-use crate::stereo::tile::Row;
+use super::{Lanes, Pairs};
+use crate::stereo::tile::{Row, Words};
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -36,7 +36,7 @@ operator!(Div, div, _mm512_div_ps);
 impl Lanes for One {
     type Bits = __m512i;
     type Mask = __mmask16;
-    const ROWS: usize = 2;
+    type Pairs = SixteenPairs;
 
     #[inline(always)]
     fn splat(v: f32) -> Self {
@@ -124,8 +124,8 @@ impl Lanes for One {
     }
 
     #[inline(always)]
-    fn times(a: __m512i, b: __m512i) -> __m512i {
-        unsafe { _mm512_mullo_epi32(a, b) }
+    fn inverted(a: __m512i) -> __m512i {
+        unsafe { _mm512_xor_si512(a, Self::whole(!0)) }
     }
 
     #[inline(always)]
@@ -157,13 +157,134 @@ impl Lanes for One {
     }
 
     #[inline(always)]
-    fn lerp_halves(words: __m512i, fraction: Self) -> Self {
+    fn load_words(words: &Words) -> __m512i {
+        unsafe { _mm512_loadu_si512(words.as_ptr().cast()) }
+    }
+
+    #[inline(always)]
+    fn store_words(words: __m512i, to: &mut Words) {
+        unsafe { _mm512_storeu_si512(to.as_mut_ptr().cast(), words) }
+    }
+
+    #[inline(always)]
+    fn store_halves(words: __m512i, first: &mut [u32; 8], second: &mut [u32; 8]) {
+        // SAFETY: each half has eight words.
         unsafe {
-            let t = (fraction * Self::splat(LERP_STEPS) + Self::splat(MAGIC)).to_bits();
-            let t = Self::plus(t, Self::whole(MAGIC_BITS.wrapping_neg()));
-            let down = _mm512_sub_epi32(Self::whole(LERP_STEPS as u32), t);
-            let weights = Self::plus(Self::shifted_left::<16>(t), down);
-            One(_mm512_cvtepi32_ps(_mm512_madd_epi16(words, weights)))
+            _mm256_storeu_si256(first.as_mut_ptr().cast(), _mm512_castsi512_si256(words));
+            _mm256_storeu_si256(second.as_mut_ptr().cast(), _mm512_extracti64x4_epi64::<1>(words));
         }
+    }
+
+    #[inline(always)]
+    fn truncated(self) -> __m512i {
+        unsafe { _mm512_cvttps_epi32(self.0) }
+    }
+
+    #[inline(always)]
+    fn from_whole(bits: __m512i) -> Self {
+        One(unsafe { _mm512_cvtepi32_ps(bits) })
+    }
+
+    #[inline(always)]
+    fn place(column: __m512i, row: __m512i, width: u32) -> __m512i {
+        unsafe {
+            let both = _mm512_mask_blend_epi16(0xAAAA_AAAA, _mm512_srli_epi32::<16>(column), row);
+            _mm512_madd_epi16(both, Self::whole(1 | width << 16))
+        }
+    }
+
+    #[inline(always)]
+    fn gather(memory: &[u32], index: __m512i) -> __m512i {
+        let Some(last) = memory.len().checked_sub(1) else { return Self::whole(0) };
+        let last = Self::whole(last.min(i32::MAX as usize) as u32);
+        // SAFETY: after the minimum every index is one of `memory`, and fits a positive i32.
+        unsafe { _mm512_i32gather_epi32::<4>(_mm512_min_epu32(index, last), memory.as_ptr().cast()) }
+    }
+
+    #[inline(always)]
+    fn first(bits: __m512i) -> u32 {
+        unsafe { _mm512_cvtsi512_si32(bits) as u32 }
+    }
+
+    const LOOKUP: bool = true;
+
+    #[inline(always)]
+    fn lookup<const ROWS: usize>(memory: &[u8], stride: usize, column: __m512i, row: __m512i) -> __m512i {
+        let index = unsafe {
+            let both = _mm512_and_si512(_mm512_srli_epi32::<12>(row), Self::whole(0x70));
+            let both = _mm512_or_si512(both, _mm512_srli_epi32::<16>(column));
+            let lane = _mm512_set4_epi32(0x0c0c_0c0c, 0x0808_0808, 0x0404_0404, 0);
+            _mm512_add_epi8(_mm512_shuffle_epi8(both, lane), Self::whole(0x1110_0100))
+        };
+        let Some(all) = memory.get(..(ROWS - 1) * stride + 16) else { return column };
+        // SAFETY: every row of sixteen bytes is within `all`.
+        unsafe {
+            let row = |k: usize| _mm_loadu_si128(all.as_ptr().add(k * stride).cast());
+            let four = |k: usize| {
+                let low = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(row(k)), row(k + 1));
+                let high = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(row(k + 2)), row(k + 3));
+                _mm512_inserti64x4::<1>(_mm512_castsi256_si512(low), high)
+            };
+            if ROWS == 8 {
+                _mm512_permutex2var_epi8(four(0), index, four(4))
+            } else {
+                _mm512_permutexvar_epi8(index, four(0))
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn bilinear(quad: __m512i, column: __m512i, row: __m512i) -> __m512i {
+        unsafe {
+            let lane = _mm512_set4_epi32(0x0c0c_0c0c, 0x0808_0808, 0x0404_0404, 0);
+            let all = _mm512_or_si512(lane, Self::whole(0x0101_0101));
+            let even = _mm512_or_si512(lane, Self::whole(0x8001_8001));
+            let across = _mm512_xor_si512(_mm512_shuffle_epi8(column, all), Self::whole(0x00ff_00ff));
+            let down = _mm512_xor_si512(_mm512_shuffle_epi8(row, even), Self::whole(0x0000_00ff));
+            _mm512_slli_epi32::<5>(_mm512_madd_epi16(_mm512_maddubs_epi16(across, quad), down))
+        }
+    }
+
+    #[inline(always)]
+    fn paired(low: __m512i, high: __m512i) -> __m512i {
+        unsafe { _mm512_mask_blend_epi16(0xAAAA_AAAA, _mm512_srli_epi32::<16>(low), high) }
+    }
+}
+
+/// Sixteen pairs in one register.
+#[derive(Clone, Copy)]
+pub(crate) struct SixteenPairs(__m512i);
+
+impl Pairs for SixteenPairs {
+    const WIDTH: usize = 16;
+
+    #[inline(always)]
+    fn splat(pair: u32) -> Self {
+        SixteenPairs(unsafe { _mm512_set1_epi32(pair as i32) })
+    }
+
+    #[inline(always)]
+    fn load(row: &[u32], at: usize) -> Self {
+        let row: &Words = row.get(at..).and_then(|r| r.first_chunk()).unwrap_or(&[0; 16]);
+        // SAFETY: the reference is to sixteen words.
+        SixteenPairs(unsafe { _mm512_loadu_si512(row.as_ptr().cast()) })
+    }
+
+    #[inline(always)]
+    fn store(self, row: &mut Words, at: usize) {
+        if at == 0 {
+            // SAFETY: the reference is to sixteen words.
+            unsafe { _mm512_storeu_si512(row.as_mut_ptr().cast(), self.0) }
+        }
+    }
+
+    #[inline(always)]
+    fn scaled(self, b: Self) -> Self {
+        SixteenPairs(unsafe { _mm512_mulhrs_epi16(self.0, b.0) })
+    }
+
+    #[inline(always)]
+    fn plus_dot(self, a: Self, b: Self) -> Self {
+        SixteenPairs(unsafe { _mm512_dpwssd_epi32(self.0, a.0, b.0) })
     }
 }

@@ -7,16 +7,32 @@
 pub(super) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(super) mod avx512;
+#[cfg(any(test, not(target_arch = "x86_64")))]
 pub(super) mod portable;
+#[cfg(target_arch = "x86_64")]
+pub(super) mod sse2;
 
-use crate::stereo::tile::Row;
+use crate::stereo::tile::{Row, Words};
 use std::ops::{Add, Div, Mul, Sub};
 
 /// Adding and subtracting this rounds a small f32 to the nearest integer, which then sits in its low bits.
 const MAGIC: f32 = 12_582_912.0;
-const MAGIC_BITS: u32 = 0x4B40_0000;
-/// Steps per pixel of the vertical fraction of a sample: products with 12-bit grey levels stay exact in f32.
-pub(crate) const LERP_STEPS: f32 = 4096.0;
+
+/// A register of pairs of signed 16-bit numbers, and of 32-bit sums of their products.
+pub(crate) trait Pairs: Copy {
+    /// Pairs in a register; a divisor of 16.
+    const WIDTH: usize;
+
+    fn splat(pair: u32) -> Self;
+    /// The pairs from `at` on; zeros if there are not enough.
+    fn load(row: &[u32], at: usize) -> Self;
+    /// Stores to `at`, if there is room.
+    fn store(self, row: &mut Words, at: usize);
+    /// Products of halves over 2¹⁵, rounded to the nearest; `b` has at most 14 bits.
+    fn scaled(self, b: Self) -> Self;
+    /// Adds the products of the low halves and of the high halves.
+    fn plus_dot(self, a: Self, b: Self) -> Self;
+}
 
 /// Sixteen f32.
 pub(crate) trait Lanes:
@@ -26,8 +42,8 @@ pub(crate) trait Lanes:
     type Bits: Copy;
     /// Sixteen truth values.
     type Mask: Copy;
-    /// Tile rows whose correlation sums fit the registers at the same time: 1, 2 or 4.
-    const ROWS: usize;
+    /// One register of pairs.
+    type Pairs: Pairs;
 
     fn splat(v: f32) -> Self;
     fn load(row: &Row) -> Self;
@@ -50,16 +66,49 @@ pub(crate) trait Lanes:
     fn whole(v: u32) -> Self::Bits;
     /// Sum modulo 2³².
     fn plus(a: Self::Bits, b: Self::Bits) -> Self::Bits;
-    /// Low half of the product.
-    fn times(a: Self::Bits, b: Self::Bits) -> Self::Bits;
+    /// −a modulo 2³².
+    #[inline(always)]
+    fn negated(a: Self::Bits) -> Self::Bits {
+        Self::plus(Self::inverted(a), Self::whole(1))
+    }
+    fn inverted(a: Self::Bits) -> Self::Bits;
     fn shifted_left<const N: u32>(a: Self::Bits) -> Self::Bits;
     fn masked(a: Self::Bits, mask: u32) -> Self::Bits;
     /// The words at `index` and the words behind them. An index without two words gives any two; `memory` holds two.
     fn fetch(memory: &[u32], index: Self::Bits) -> (Self::Bits, Self::Bits);
-    /// `low · (4096 − t) + high · t` of the two signed halves of each word, `t = round(4096 · fraction)`; exact for
-    /// halves of 12 bits and fractions in 0..=1.
-    fn lerp_halves(words: Self::Bits, fraction: Self) -> Self;
-
+    fn load_words(words: &Words) -> Self::Bits;
+    fn store_words(words: Self::Bits, to: &mut Words);
+    /// The first eight words and the others.
+    fn store_halves(words: Self::Bits, first: &mut [u32; 8], second: &mut [u32; 8]);
+    /// The whole part of every lane; lanes are within the range of an i32.
+    fn truncated(self) -> Self::Bits;
+    /// Lanes of signed integers.
+    fn from_whole(bits: Self::Bits) -> Self;
+    /// `row · width + column` of the whole parts of fixed-point numbers with 16 fractional bits.
+    fn place(column: Self::Bits, row: Self::Bits, width: u32) -> Self::Bits;
+    /// The words at `index`. An index beyond the end gives any word; `memory` is not empty.
+    fn gather(memory: &[u32], index: Self::Bits) -> Self::Bits;
+    /// Whether [`Lanes::lookup`] is there, and faster than [`Lanes::gather`].
+    const LOOKUP: bool = false;
+    /// The first lane.
+    fn first(bits: Self::Bits) -> u32;
+    /// The bytes at the whole parts of fixed-point columns and rows, at the next column, and at both in the next row:
+    /// as packed in words for [`Lanes::bilinear`]. `ROWS` (4 or 8) rows of sixteen bytes, `stride` apart, start at the
+    /// first byte of `memory`; all columns are below 15 and all rows below `ROWS` − 1, and memory holds all rows.
+    #[inline(always)]
+    fn lookup<const ROWS: usize>(
+        _memory: &[u8],
+        _stride: usize,
+        column: Self::Bits,
+        _row: Self::Bits,
+    ) -> Self::Bits {
+        column
+    }
+    /// Bilinear samples of four signed bytes (left, right, left below, right below, from the low byte up) at the
+    /// fractions of fixed-point numbers with 16 fractional bits, of which eight are used: 255² · 32 times the bytes.
+    fn bilinear(quad: Self::Bits, column: Self::Bits, row: Self::Bits) -> Self::Bits;
+    /// The high halves of two words as one: `low`'s in the low half.
+    fn paired(low: Self::Bits, high: Self::Bits) -> Self::Bits;
     /// The sum of the lanes, left to right.
     #[inline(always)]
     fn sum(self) -> f32 {
@@ -76,15 +125,10 @@ pub(crate) trait Lanes:
         (self - (shifted - Self::splat(MAGIC)), shifted.to_bits())
     }
 
-    /// `row · width + column` of whole numbers from [`Lanes::fraction_and_whole`].
+    /// `row · width + column` of whole numbers below 2¹⁵ from [`Lanes::fraction_and_whole`].
     #[inline(always)]
     fn row_major(column: Self::Bits, row: Self::Bits, width: usize) -> Self::Bits {
-        let width = width as u32;
-        let excess = MAGIC_BITS.wrapping_mul(width).wrapping_add(MAGIC_BITS);
-        Self::plus(
-            Self::plus(Self::times(row, Self::whole(width)), column),
-            Self::whole(excess.wrapping_neg()),
-        )
+        Self::place(Self::shifted_left::<16>(column), Self::shifted_left::<16>(row), width as u32)
     }
 
     /// A bell of unit height: close to e⁻ˣ for x ≥ 0, and 0 from x = 8 on.

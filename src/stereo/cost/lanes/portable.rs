@@ -1,7 +1,7 @@
 //! Lanes as an array: readable, safe, and vectorised by the compiler as far as it can.
 
-use super::{LERP_STEPS, Lanes, MAGIC};
-use crate::stereo::tile::Row;
+use super::{Lanes, Pairs};
+use crate::stereo::tile::{Row, Words};
 use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -37,7 +37,7 @@ impl Sixteen {
 impl Lanes for Sixteen {
     type Bits = [u32; 16];
     type Mask = [u32; 16];
-    const ROWS: usize = 1;
+    type Pairs = FourPairs;
 
     #[inline(always)]
     fn splat(v: f32) -> Self {
@@ -125,8 +125,8 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn times(a: [u32; 16], b: [u32; 16]) -> [u32; 16] {
-        from_fn(|i| a[i].wrapping_mul(b[i]))
+    fn inverted(a: [u32; 16]) -> [u32; 16] {
+        a.map(|v| !v)
     }
 
     #[inline(always)]
@@ -147,12 +147,110 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn lerp_halves(words: [u32; 16], fraction: Self) -> Self {
-        Sixteen(from_fn(|i| {
-            let t = (fraction.0[i] * LERP_STEPS + MAGIC) - MAGIC;
-            let low = ((words[i] << 16) as i32 >> 16) as f32;
-            let high = (words[i] as i32 >> 16) as f32;
-            low * (LERP_STEPS - t) + high * t
+    fn load_words(words: &Words) -> [u32; 16] {
+        *words
+    }
+
+    #[inline(always)]
+    fn store_words(words: [u32; 16], to: &mut Words) {
+        *to = words;
+    }
+
+    #[inline(always)]
+    fn store_halves(words: [u32; 16], first: &mut [u32; 8], second: &mut [u32; 8]) {
+        first.copy_from_slice(&words[..8]);
+        second.copy_from_slice(&words[8..]);
+    }
+
+    #[inline(always)]
+    fn truncated(self) -> [u32; 16] {
+        self.0.map(|v| v as i32 as u32)
+    }
+
+    #[inline(always)]
+    fn from_whole(bits: [u32; 16]) -> Self {
+        Sixteen(bits.map(|v| v as i32 as f32))
+    }
+
+    #[inline(always)]
+    fn place(column: [u32; 16], row: [u32; 16], width: u32) -> [u32; 16] {
+        from_fn(|i| (row[i] >> 16).wrapping_mul(width).wrapping_add(column[i] >> 16))
+    }
+
+    #[inline(always)]
+    fn gather(memory: &[u32], index: [u32; 16]) -> [u32; 16] {
+        index.map(|i| memory.get(i as usize).copied().unwrap_or(0))
+    }
+
+    #[inline(always)]
+    fn first(bits: [u32; 16]) -> u32 {
+        bits[0]
+    }
+
+    #[inline(always)]
+    fn bilinear(quad: [u32; 16], column: [u32; 16], row: [u32; 16]) -> [u32; 16] {
+        from_fn(|i| {
+            let [a, b, c, d] = quad[i].to_le_bytes().map(|v| i32::from(v as i8));
+            let (f, g) = ((column[i] >> 8 & 255) as i32, (row[i] >> 8 & 255) as i32);
+            let (top, bottom) = (a * (255 - f) + b * f, c * (255 - f) + d * f);
+            ((top * (255 - g) + bottom * g) << 5) as u32
+        })
+    }
+
+    #[inline(always)]
+    fn paired(low: [u32; 16], high: [u32; 16]) -> [u32; 16] {
+        from_fn(|i| low[i] >> 16 | high[i] & 0xffff_0000)
+    }
+}
+
+/// Four pairs: low halves, high halves.
+#[derive(Clone, Copy)]
+pub(crate) struct FourPairs(pub(super) [u32; 4]);
+
+impl Pairs for FourPairs {
+    const WIDTH: usize = 4;
+
+    #[inline(always)]
+    fn splat(pair: u32) -> Self {
+        FourPairs([pair; 4])
+    }
+
+    #[inline(always)]
+    fn load(row: &[u32], at: usize) -> Self {
+        FourPairs(row.get(at..).and_then(|r| r.first_chunk()).copied().unwrap_or_default())
+    }
+
+    #[inline(always)]
+    fn store(self, row: &mut Words, at: usize) {
+        if let Some(to) = row.get_mut(at..).and_then(|r| r.first_chunk_mut()) {
+            *to = self.0;
+        }
+    }
+
+    #[inline(always)]
+    fn scaled(self, b: Self) -> Self {
+        FourPairs(from_fn(|i| {
+            let low = (low_half(self.0[i]) * low_half(b.0[i]) + 0x4000) >> 15;
+            let high = (high_half(self.0[i]) * high_half(b.0[i]) + 0x4000) >> 15;
+            low as u32 & 0xffff | (high as u32) << 16
         }))
     }
+
+    #[inline(always)]
+    fn plus_dot(self, a: Self, b: Self) -> Self {
+        FourPairs(from_fn(|i| {
+            let both = low_half(a.0[i]) * low_half(b.0[i]) + high_half(a.0[i]) * high_half(b.0[i]);
+            self.0[i].wrapping_add(both as u32)
+        }))
+    }
+}
+
+#[inline(always)]
+fn low_half(v: u32) -> i32 {
+    i32::from(v as i16)
+}
+
+#[inline(always)]
+fn high_half(v: u32) -> i32 {
+    v as i32 >> 16
 }

@@ -1,7 +1,7 @@
 //! Every implementation of the lanes against the plain one, bit by bit.
 
-use super::portable::Sixteen;
-use super::{Lanes, Row};
+use super::portable::{FourPairs, Sixteen};
+use super::{Lanes, Pairs, Row, Words};
 use crate::stereo::rng::Rng;
 
 const WORDS: usize = 500;
@@ -20,38 +20,97 @@ fn rows() -> Vec<Row> {
     rows
 }
 
-/// The bits of everything an implementation makes of two rows.
-fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32]) -> Vec<[u32; 16]> {
+/// Sixteen random words, kept bits only.
+fn words(rng: &mut Rng, kept: u32) -> Words {
+    std::array::from_fn(|_| (rng.below(1 << 16) as u32 * 65_537 + rng.below(1 << 16) as u32) & kept)
+}
+
+/// The bits of everything an implementation makes of two rows and random words.
+fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32], seed: u32) -> Vec<Words> {
+    let rng = &mut Rng::keyed(5, 6, 7, seed);
     let (x, y) = (L::load(a), L::load(b));
     let less = L::both(x.lt(y), L::splat(-200.0).le(x));
-    let indices = std::array::from_fn(|i| f32::from_bits((a[i].abs() as u32).min(WORDS as u32 - 2)));
-    let (words, next) = L::fetch(memory, L::load(&indices).to_bits());
-    let fractions = (x.abs() * L::splat(1.0 / 300.0)).min(L::splat(1.0));
-    let (fraction, whole) = (x.abs() + L::splat(0.75)).min(L::splat(4e6)).fraction_and_whole();
-    let bits = L::plus(L::row_major(whole, whole, 17), L::masked(L::shifted_left::<3>(y.to_bits()), 0xff00));
+    let index = L::load_words(&words(rng, 0xff));
+    let (first, next) = L::fetch(memory, index);
+    let (fraction, whole) = (x.abs() + L::splat(0.75)).min(L::splat(3e4)).fraction_and_whole();
     let any = L::splat(f32::from(u8::from(L::any(less)) + 2 * u8::from(L::all(L::splat(-1e9).lt(x)))));
-    [x + y, x - y, x * y, x / y, x.min(y), x.max(y), x.abs().sqrt(), L::select(less, x, y), any]
+    let small = x.min(L::splat(1e6)).max(L::splat(-1e6));
+    let [quad, u, v] = [!0, 0x7f_ffff, 0x3f_ffff].map(|kept| L::load_words(&words(rng, kept)));
+    let (mut halves, mut stored_words) = ([[0; 8]; 2], [0; 16]);
+    let [top, bottom] = &mut halves;
+    L::store_halves(quad, top, bottom);
+    L::store_words(L::paired(quad, u), &mut stored_words);
+    let numbers = [x + y, x - y, x * y, x / y, x.min(y), x.max(y), x.abs().sqrt(), L::select(less, x, y)]
         .into_iter()
-        .chain([L::from_bits(words), L::from_bits(next), L::from_bits(bits), fraction])
-        .chain([L::lerp_halves(words, fractions), L::bell8(x.abs()), L::bell64(x.abs()), L::splat(x.sum())])
-        .map(stored)
+        .chain([any, fraction, L::bell8(x.abs()), L::bell64(x.abs()), L::splat(x.sum()), L::from_whole(quad)])
+        .map(L::to_bits);
+    let bits = [first, next, L::row_major(whole, whole, 17), L::masked(L::shifted_left::<3>(quad), 0xff00)]
+        .into_iter()
+        .chain([L::plus(quad, u), L::negated(quad), small.truncated(), L::place(u, v, 300)])
+        .chain([L::gather(memory, index), L::bilinear(quad, u, v), L::whole(L::first(quad))]);
+    numbers
+        .chain(bits)
+        .map(|bits| stored(L::from_bits(bits)))
+        .chain([stored_words, std::array::from_fn(|i| halves[i / 8][i % 8])])
         .collect()
 }
 
+/// Sums of products of pairs of 14-bit numbers.
+fn products<P: Pairs>(seed: u32) -> [Words; 2] {
+    let rng = &mut Rng::keyed(8, 9, 10, seed);
+    let mut out = [[0; 16]; 2];
+    let weights = words(rng, 0x7fff_7fff);
+    // signed halves of fourteen bits
+    let [a, b] = [(); 2].map(|()| words(rng, !0).map(|w| (w & 0xffff) as i16 >> 2).map(|v| v as u16));
+    let pair =
+        |h: [u16; 16]| -> Words { std::array::from_fn(|i| u32::from(h[i]) | u32::from(h[15 - i]) << 16) };
+    let (a, b) = (pair(a), pair(b));
+    for at in (0..16).step_by(P::WIDTH) {
+        let scaled = P::load(&weights, at).scaled(P::load(&a, at));
+        scaled.store(&mut out[0], at);
+        P::splat(77).plus_dot(scaled, P::load(&b, at)).store(&mut out[1], at);
+    }
+    out
+}
+
 fn assert_same<L: Lanes>(name: &str) {
-    // halves of twelve bits, signed
-    let half = |i: usize| (i as i32 * 37 % 4096 - 2048) as i16 as u16;
-    let memory: Vec<u32> = (0..WORDS).map(|i| u32::from(half(i)) | u32::from(half(i + 9)) << 16).collect();
-    let rows = rows();
-    for pair in rows.windows(2) {
-        let want = results::<Sixteen>(&pair[0], &pair[1], &memory);
-        let got = results::<L>(&pair[0], &pair[1], &memory);
+    let memory = words(&mut Rng::keyed(1, 1, 1, 1), !0).repeat(WORDS / 16);
+    for (seed, pair) in rows().windows(2).enumerate() {
+        let want = results::<Sixteen>(&pair[0], &pair[1], &memory, seed as u32);
+        let got = results::<L>(&pair[0], &pair[1], &memory, seed as u32);
         for (k, (want, got)) in want.iter().zip(&got).enumerate() {
             for (w, g) in want.iter().zip(got) {
                 let both_nan = f32::from_bits(*w).is_nan() && f32::from_bits(*g).is_nan();
                 assert!(w == g || both_nan, "{name}, result {k}: {w:x} {g:x} of {pair:?}");
             }
         }
+        let (want, got) = (products::<FourPairs>(seed as u32), products::<L::Pairs>(seed as u32));
+        assert_eq!(want, got, "{name}, pairs {seed}");
+    }
+}
+
+/// Looks quads up in tables of 4 and 8 rows and gathers them from memory.
+fn assert_lookup_gathers<L: Lanes>() {
+    const STRIDE: usize = 40;
+    let rng = &mut Rng::keyed(3, 3, 3, 3);
+    let bytes: Vec<u8> = (0..STRIDE * 8).map(|_| rng.below(256) as u8).collect();
+    let (columns, rows) = (words(rng, !0), words(rng, !0));
+    for height in [4u32, 8] {
+        let column = columns.map(|c| c % (15 << 16));
+        let row = rows.map(|r| r % ((height - 1) << 16));
+        let want: Words = std::array::from_fn(|i| {
+            let at = (row[i] >> 16) as usize * STRIDE + (column[i] >> 16) as usize;
+            u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + STRIDE], bytes[at + STRIDE + 1]])
+        });
+        let (column, row) = (L::load_words(&column), L::load_words(&row));
+        let got = if height == 4 {
+            L::lookup::<4>(&bytes, STRIDE, column, row)
+        } else {
+            L::lookup::<8>(&bytes, STRIDE, column, row)
+        };
+        let mut stored = [0; 16];
+        L::store_words(got, &mut stored);
+        assert_eq!(stored, want, "{height} rows");
     }
 }
 
@@ -59,20 +118,27 @@ fn assert_same<L: Lanes>(name: &str) {
 #[test]
 fn wide_registers_give_the_same_bits() {
     use crate::stereo::CpuLevel;
+    assert_same::<super::sse2::Four>("sse2");
     if CpuLevel::Avx2.is_supported() {
         assert_same::<super::avx2::Two>("avx2");
     }
     if CpuLevel::Avx512.is_supported() {
         assert_same::<super::avx512::One>("avx512");
+        assert_lookup_gathers::<super::avx512::One>();
     }
 }
 
 #[test]
 fn plain_lanes_compute_what_they_say() {
     assert_same::<Sixteen>("portable");
-    let quarter = Sixteen::splat(0.25);
-    let words = [0x0040_0010u32; 16]; // low half 16, high half 64
-    assert_eq!(stored(Sixteen::lerp_halves(words, quarter)), [(4096.0f32 * 28.0).to_bits(); 16]);
+    // a quarter of a pixel right of and half a pixel below bytes 16, 32 / -16, 0; one is 255 steps of 256
+    let quad = [u32::from_le_bytes([16, 32, -16i8 as u8, 0]); 16];
+    let (f, g) = (64.0 / 255.0, 128.0 / 255.0);
+    let want = (16.0 + f * 16.0) * (1.0 - g) + (-16.0 + f * 16.0) * g;
+    let got = Sixteen::bilinear(quad, [3 << 16 | 64 << 8; 16], [7 << 16 | 128 << 8; 16])[0] as i32;
+    assert!((f64::from(got) - want * 255.0 * 255.0 * 32.0).abs() < 1.0, "{got} {want}");
+    assert_eq!(Sixteen::place([5 << 16 | 9; 16], [2 << 16 | 9; 16], 100), [205; 16]);
+    assert_eq!(FourPairs::splat(0x4000_2000).scaled(FourPairs::splat(0x0064_ff9c)).0, [0x0032_ffe7; 4]);
     let (fraction, column) = Sixteen::splat(6.75).fraction_and_whole();
     let (_, row) = Sixteen::splat(2.25).fraction_and_whole();
     assert_eq!(
