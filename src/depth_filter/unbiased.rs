@@ -23,6 +23,9 @@ pub struct UnbiasedFilterOptions {
     pub contradictions_per_confirmation: f32,
     /// Neighbours that take part, best first, at most 255. Default 8.
     pub max_neighbors: u32,
+    /// Confidences (0..1) of a depth and of those that confirm it must add up to this; mirror images behind windows and
+    /// clouds in the sky are seen by many views, but by none well. 0 asks for nothing. Default 0.06.
+    pub min_evidence: f32,
 }
 
 impl Default for UnbiasedFilterOptions {
@@ -32,6 +35,7 @@ impl Default for UnbiasedFilterOptions {
             min_confirming: 1,
             contradictions_per_confirmation: 0.5,
             max_neighbors: 8,
+            min_evidence: 0.06,
         }
     }
 }
@@ -46,6 +50,12 @@ impl UnbiasedFilterOptions {
             return Err(Error::invalid(format!(
                 "the unbiased filter's largest depth difference is {}: give a value between 0 and 1, such as 0.01",
                 self.max_depth_diff
+            )));
+        }
+        if !(self.min_evidence >= 0.0 && self.min_evidence.is_finite()) {
+            return Err(Error::invalid(format!(
+                "the unbiased filter's least evidence is {}: give a sum of confidences, such as 0.06",
+                self.min_evidence
             )));
         }
         if !(1..=255).contains(&self.max_neighbors) || self.contradictions_per_confirmation.is_nan() {
@@ -69,7 +79,7 @@ pub struct Votes {
 }
 
 /// Removes the depths of `reference` that its `neighbors` (best first, unfiltered maps) do not confirm or mostly
-/// contradict. Depths, confidences and normals that stay are not changed; the others become 0, normals excepted.
+/// contradict, and those of too little evidence. Depths, confidences and normals that stay are not changed; the others become 0, normals excepted.
 /// Without any neighbour the map stays as it is.
 pub fn filter_unbiased(
     reference: &FilterView<'_>,
@@ -81,13 +91,15 @@ pub fn filter_unbiased(
     if used.is_empty() {
         return filtered;
     }
-    let votes = count_votes(reference, used, options.max_depth_diff);
+    let (votes, evidence) = survey(reference, used, options.max_depth_diff);
     let required = options.min_confirming.min(used.len() as u32);
-    for (i, votes) in votes.data().iter().enumerate() {
+    let judged = reference.estimate.confidence.is_some();
+    for (i, (votes, &evidence)) in votes.data().iter().zip(evidence.data()).enumerate() {
         let confirming = u32::from(votes.confirming);
         let outvoted = f32::from(votes.contradicting)
             > options.contradictions_per_confirmation * f32::from(votes.confirming);
-        if confirming < required || outvoted {
+        let doubtful = judged && evidence < options.min_evidence;
+        if confirming < required || outvoted || doubtful {
             filtered.depth.data_mut()[i] = 0.0;
             if let Some(confidence) = &mut filtered.confidence {
                 confidence.data_mut()[i] = 0.0;
@@ -103,25 +115,40 @@ pub fn count_votes(
     neighbors: &[FilterView<'_>],
     max_depth_diff: f32,
 ) -> Grid<Votes> {
+    survey(reference, neighbors, max_depth_diff).0
+}
+
+/// The votes, and the sums of the confidences of every depth and of those that confirm it; views without confidences
+/// add nothing.
+fn survey(
+    reference: &FilterView<'_>,
+    neighbors: &[FilterView<'_>],
+    max_depth_diff: f32,
+) -> (Grid<Votes>, Grid<f32>) {
     let estimate = reference.estimate;
-    let mut votes = Grid::filled(estimate.depth.size(), Votes::default());
+    let size = estimate.depth.size();
+    let mut votes = Grid::filled(size, Votes::default());
+    let mut evidence = estimate.confidence.clone().unwrap_or_else(|| Grid::filled(size, 0.0));
     let witnesses: Vec<Witness<'_>> = neighbors.iter().map(|n| Witness::new(&estimate.camera, *n)).collect();
     let width = estimate.depth.width().max(1);
-    votes.data_mut().par_chunks_mut(width).enumerate().for_each_init(
-        RowScratch::default,
-        |scratch, (y, row)| {
-            let labels = reference.labels.map(|labels| labels.row(y));
-            for witness in &witnesses {
-                let differences = scratch.compare(witness, y, estimate.depth.row(y), labels);
-                for (votes, &difference) in row.iter_mut().zip(differences) {
-                    votes.confirming += u8::from(difference.abs() < max_depth_diff);
-                    votes.occluding += u8::from(difference <= -max_depth_diff);
-                    votes.contradicting += u8::from(difference >= max_depth_diff);
-                }
+    let rows = votes.data_mut().par_chunks_mut(width).zip(evidence.data_mut().par_chunks_mut(width));
+    rows.enumerate().for_each_init(RowScratch::default, |scratch, (y, (votes, evidence))| {
+        let labels = reference.labels.map(|labels| labels.row(y));
+        for witness in &witnesses {
+            let found = scratch.compare(witness, y, estimate.depth.row(y), labels);
+            let differences = found.differences.iter().zip(found.confidences);
+            for ((votes, evidence), (&difference, &confidence)) in
+                votes.iter_mut().zip(evidence.iter_mut()).zip(differences)
+            {
+                let confirms = difference.abs() < max_depth_diff;
+                votes.confirming += u8::from(confirms);
+                votes.occluding += u8::from(difference <= -max_depth_diff);
+                votes.contradicting += u8::from(difference >= max_depth_diff);
+                *evidence += if confirms { confidence } else { 0.0 };
             }
-        },
-    );
-    votes
+        }
+    });
+    (votes, evidence)
 }
 
 #[cfg(test)]

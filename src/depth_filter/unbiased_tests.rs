@@ -79,6 +79,26 @@ fn contradictions_count_against_confirmations() {
 }
 
 #[test]
+fn depths_that_nobody_sees_well_go() {
+    let mut views = slanted_views();
+    let sure = |view: &mut DepthEstimate, c: f32| {
+        view.confidence = Some(Grid::filled(view.depth.size(), c));
+    };
+    // four views of a quarter each make one
+    views.iter_mut().for_each(|view| sure(view, 0.25));
+    let least = |e: f32| UnbiasedFilterOptions { min_evidence: e, ..Default::default() };
+    assert!(filter(&views, &least(0.99)).depth[CENTRE] > 0.0);
+    assert_eq!(filter(&views, &least(1.01)).depth[CENTRE], 0.0);
+    // who does not confirm adds nothing
+    views[3].depth.data_mut().iter_mut().for_each(|d| *d *= 0.5);
+    assert_eq!(filter(&views, &least(0.99)).depth[CENTRE], 0.0);
+    assert!(filter(&views, &least(0.74)).depth[CENTRE] > 0.0);
+    // without confidences there is nothing to add up
+    views.iter_mut().for_each(|view| view.confidence = None);
+    assert!(filter(&views, &least(0.99)).depth[CENTRE] > 0.0);
+}
+
+#[test]
 fn a_neighbour_of_another_class_has_no_vote() {
     let views = slanted_views();
     let size = views[0].depth.size();

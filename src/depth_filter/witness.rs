@@ -58,20 +58,29 @@ pub(super) struct RowScratch {
     seen: Vec<f32>,
     /// Normal of the neighbour's pixel.
     normals: [Vec<f32>; 3],
+    /// Confidence of the neighbour's pixel; 0 if it has none.
+    confidences: Vec<f32>,
     /// The result.
     differences: Vec<f32>,
 }
 
+/// What a neighbour says about a row of points.
+pub(super) struct Testimony<'a> {
+    /// How much farther its surface is than the points, relative to their depths in it; NaN where it has nothing to say.
+    pub(super) differences: &'a [f32],
+    /// How sure it is of that, 0..1.
+    pub(super) confidences: &'a [f32],
+}
+
 impl RowScratch {
-    /// How much farther the neighbour's surface is than the points of row `y` of the reference with these `depths`, relative
-    /// to the points' depths in the neighbour; NaN where the neighbour has nothing to say.
+    /// What the neighbour says about the points of row `y` of the reference with these `depths`.
     pub(super) fn compare(
         &mut self,
         witness: &Witness<'_>,
         y: usize,
         depths: &[f32],
         labels: Option<&[u16]>,
-    ) -> &[f32] {
+    ) -> Testimony<'_> {
         self.project(witness, y as f32, depths);
         match labels.zip(witness.view.labels) {
             Some((own, other)) => {
@@ -84,7 +93,7 @@ impl RowScratch {
             None => self.look(witness, |_, _| false),
         }
         self.judge(witness.view.estimate.normal.is_some());
-        &self.differences
+        Testimony { differences: &self.differences, confidences: &self.confidences }
     }
 
     /// Where the points fall.
@@ -131,14 +140,18 @@ impl RowScratch {
         let count = self.pixels.len();
         self.seen.resize(count, 0.0);
         self.normals.iter_mut().for_each(|list| list.resize(count, 0.0));
+        self.confidences.resize(count, 0.0);
+        let confidences = estimate.confidence.as_ref().map(|map| map.data());
         let [nx, ny, nz] = &mut self.normals;
-        let all = self.pixels.iter().zip(&mut self.seen).zip(nx.iter_mut().zip(ny).zip(nz));
-        for (x, ((&pixel, seen), ((nx, ny), nz))) in all.enumerate() {
+        let seen = self.seen.iter_mut().zip(&mut self.confidences);
+        let all = self.pixels.iter().zip(seen).zip(nx.iter_mut().zip(ny).zip(nz));
+        for (x, ((&pixel, (seen, confidence)), ((nx, ny), nz))) in all.enumerate() {
             // A pixel is looked at even if there is none, so that nothing has to be guessed ahead.
             let there = (pixel as usize).min(last);
             let depth = depths[there];
             let speaks = (pixel != OUTSIDE) & (depth > 0.0) & !differs(x, there);
             *seen = if speaks { depth } else { f32::NAN };
+            *confidence = confidences.map_or(0.0, |map| map[there]);
             if let Some(normals) = normals {
                 [*nx, *ny, *nz] = normals[there];
             }
