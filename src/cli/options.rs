@@ -2,6 +2,7 @@
 //! Names, meanings and defaults are those of OpenMVS 2.3.0.
 
 use super::values::boolean;
+use crate::stereo::Quality;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -56,6 +57,9 @@ pub(crate) struct ImageOptions {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Depth estimation")]
 pub(crate) struct EstimationOptions {
+    /// How much is tried for every depth [default: normal in semvs, high in DensifyPointCloud]
+    #[arg(long, value_name = "QUALITY", value_enum)]
+    pub(crate) quality: Option<QualityName>,
     /// Coarser levels that estimation starts from
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub(crate) sub_resolution_levels: u32,
@@ -98,6 +102,26 @@ pub(crate) struct FusionOptions {
 }
 
 /// `--filter`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QualityName {
+    /// for a look: about 0.6 of the normal time
+    Draft,
+    /// depth maps that match OpenMVS's
+    Normal,
+    /// for the last details: about 1.5 times the normal time
+    High,
+}
+
+impl From<QualityName> for Quality {
+    fn from(name: QualityName) -> Self {
+        match name {
+            QualityName::Draft => Quality::Draft,
+            QualityName::Normal => Quality::Normal,
+            QualityName::High => Quality::High,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FilterKind {
     /// OpenMVS's: depths move towards those of the neighbours

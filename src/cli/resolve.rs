@@ -13,7 +13,7 @@ use crate::pipeline::{
 };
 use crate::scene::{NeighborOptions, OutsideRoi, PairingOptions, ResolutionOptions, RoiEstimation};
 use crate::semantics::{ClassRules, Consistency, Voters};
-use crate::stereo::{CpuLevel, StereoOptions};
+use crate::stereo::{CpuLevel, Quality, StereoOptions};
 use crate::store::cloud::PlyLayout;
 use crate::store::labels::{LabelSources, MissingLabels, UnknownLabel};
 use std::path::{Path, PathBuf};
@@ -127,13 +127,13 @@ impl<'a> Resolver<'a> {
         Ok(options)
     }
 
-    /// Estimation.
+    /// Estimation; `default`: the quality when none is typed.
     ///
     /// # Errors
     /// Values out of range.
-    pub(crate) fn stereo(&self) -> Result<StereoOptions> {
+    pub(crate) fn stereo(&self, default: Quality) -> Result<StereoOptions> {
         let typed = &self.options.estimation;
-        let own = StereoOptions::default();
+        let own = StereoOptions::of(typed.quality.map_or(default, Quality::from));
         let (config, openmvs) = (&self.config, DenseConfig::default());
         // OpenMVS's defaults are those of its estimator; a file that repeats them asks for nothing.
         let asked = |value: f32, default: f32, own: f32| if value == default { own } else { value };

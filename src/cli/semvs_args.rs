@@ -134,6 +134,7 @@ impl From<ColmapPass> for Pass {
 /// reused.
 const NOT_FOR_FUSE: &[&str] = &[
     "number_views",
+    "quality",
     "sub_resolution_levels",
     "iters",
     "geometric_iters",

@@ -9,6 +9,7 @@ use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::DensifyArgs;
 use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob};
+use crate::stereo::Quality;
 use crate::store::paths::is_same_file;
 use clap::ArgMatches;
 use std::path::PathBuf;
@@ -56,7 +57,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder },
         pictures: false,
-        stereo: resolver.stereo()?,
+        stereo: resolver.stereo(Quality::Normal)?,
         filter: resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?,
         depth_maps_only,
         remove_depth_maps: shared.fusion.remove_dmaps,

@@ -152,6 +152,7 @@ pub(crate) const BEYOND: &[&str] = &[
     "offset",
     "las-normals",
     "filter",
+    "quality",
     "strict",
     "strict-openmvs",
     "estimate-segmentation",

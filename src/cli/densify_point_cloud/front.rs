@@ -165,6 +165,8 @@ mod tests {
                     "missing-labels" | "unknown-label" => "void".into(),
                     "ply-layout" => "plain".into(),
                     "filter" => "unbiased".into(),
+                    "quality" => "draft".into(),
+                    "label-votes" => "merged".into(),
                     "offset" => "1,-2,3".into(),
                     _ => "1".into(),
                 });

@@ -15,6 +15,7 @@ use crate::cli::values::{openmvs_path, under};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
 use crate::report::{RunReport, class_table};
+use crate::stereo::Quality;
 use crate::store::atomic::create_folder;
 use crate::store::cloud::{CloudFormat, PlyLayout};
 use crate::store::paths::with_suffix;
@@ -156,7 +157,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() },
         pictures: args.verbosity >= PICTURES,
-        stereo: resolver.stereo()?,
+        stereo: resolver.stereo(Quality::High)?,
         filter: resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
         depth_maps_only: shared.estimation.fusion_mode == 1,
         remove_depth_maps: shared.fusion.remove_dmaps,
