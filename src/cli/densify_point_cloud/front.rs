@@ -167,6 +167,7 @@ mod tests {
                     "filter" => "unbiased".into(),
                     "quality" => "draft".into(),
                     "label-votes" => "merged".into(),
+                    "label-filter" => "on".into(),
                     "offset" => "1,-2,3".into(),
                     _ => "1".into(),
                 });
