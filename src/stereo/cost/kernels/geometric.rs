@@ -14,12 +14,10 @@ const CAP: f32 = 4.0;
 #[inline(always)]
 pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, (x, y): (f32, f32), w: L, weight: f32) -> L {
     let column = L::splat(x) + L::load(&LANE);
-    let row =
-        |r: usize| L::splat(g.a[r][0]) * column + L::splat(g.a[r][1] * y + g.a[r][2]) + L::splat(g.b[r]) * w;
     let (one, near) = (L::splat(1.0), L::splat(1e-6));
-    let z = row(2);
+    let z = projected(g, 2, column, y, w);
     let r = one / near.max(z);
-    let (u, v) = (row(0) * r, row(1) * r);
+    let (u, v) = (projected(g, 0, column, y, w) * r, projected(g, 1, column, y, w) * r);
     let ku = one.max(u).min(L::splat(g.width as f32 - 2.0));
     let kv = one.max(v).min(L::splat(g.height as f32 - 2.0));
     let inside = L::both(((ku - u).abs() + (kv - v).abs()).le(L::splat(0.0)), near.lt(z));
@@ -38,4 +36,11 @@ pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, (x, y): (f32, f32), w
     let pixels = (e * (e + L::splat(2.0))).sqrt().min(L::splat(CAP));
     let known = L::both(L::splat(0.0).lt(p), d.lt(here * L::splat(GATE)));
     L::select(L::both(inside, known), pixels, L::splat(CAP)) * L::splat(weight)
+}
+
+/// Homogeneous coordinate `r` of the source pixels of a row of hypotheses. Not a closure: those are compiled without the
+/// instructions of the kernel that calls them.
+#[inline(always)]
+fn projected<L: Lanes>(g: &SourceGeometry, r: usize, column: L, y: f32, w: L) -> L {
+    L::splat(g.a[r][0]) * column + L::splat(g.a[r][1] * y + g.a[r][2]) + L::splat(g.b[r]) * w
 }

@@ -21,7 +21,9 @@ pub(in crate::stereo::cost) fn prepare<L: Lanes>(tile: &mut Tile, level: &Level)
     let interior =
         x0 >= reach && y0 >= reach && x0 + (TILE_W as i32) + reach <= w && y0 + (TILE_H as i32) + reach <= h;
     if interior {
-        (0..TILE_H).for_each(|y| row::<L, true>(&mut tile.patch, &tile.scratch.valid, level.weighting, y));
+        for y in 0..TILE_H {
+            row::<L, true>(&mut tile.patch, &tile.scratch.valid, level.weighting, y);
+        }
     } else {
         for (r, row) in tile.scratch.valid.iter_mut().enumerate() {
             for (c, v) in row.iter_mut().enumerate() {
@@ -29,9 +31,13 @@ pub(in crate::stereo::cost) fn prepare<L: Lanes>(tile: &mut Tile, level: &Level)
                 *v = if x >= 0 && y >= 0 && x < w && y < h { 1.0 } else { 0.0 };
             }
         }
-        (0..TILE_H).for_each(|y| row::<L, false>(&mut tile.patch, &tile.scratch.valid, level.weighting, y));
+        for y in 0..TILE_H {
+            row::<L, false>(&mut tile.patch, &tile.scratch.valid, level.weighting, y);
+        }
     }
-    (0..WIN_H).for_each(|y| pair_up::<L>(&mut tile.patch, y));
+    for y in 0..WIN_H {
+        pair_up::<L>(&mut tile.patch, y);
+    }
     let (patch, belief) = (&tile.patch, &mut tile.belief);
     for y in 0..TILE_H {
         let k = L::bell64(L::load(&patch.norm[y]) * L::splat(PRIOR_FALLOFF));
