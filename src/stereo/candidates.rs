@@ -46,6 +46,21 @@ pub(crate) fn best_of_cell(tile: &Tile, k: usize) -> Option<(usize, usize, f32)>
     best
 }
 
+/// The active pixel with the smallest matching cost, if any is active.
+pub(crate) fn likeliest(tile: &Tile) -> Option<(usize, usize)> {
+    let b = &tile.belief;
+    let mut best: Option<(usize, usize, f32)> = None;
+    for y in 0..TILE_H {
+        for x in 0..TILE_W {
+            let cost = b.data[y][x];
+            if b.active[y][x] > 0.5 && best.is_none_or(|(_, _, c)| cost < c) {
+                best = Some((x, y, cost));
+            }
+        }
+    }
+    best.map(|(x, y, _)| (x, y))
+}
+
 /// The `k`th cell of a visit that starts at cell `first`.
 pub(crate) fn spread(first: usize, k: usize) -> usize {
     (first + k * CELL_STEP) % CELLS

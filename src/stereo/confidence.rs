@@ -49,9 +49,14 @@ fn sharpened(cost: f32) -> f32 {
     c * c
 }
 
+/// The matching cost, at most 1, of a confidence.
+pub(crate) fn cost_of(confidence: f32) -> f32 {
+    1.0 - confidence.max(0.0).sqrt().sqrt().sqrt()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::sharpened;
+    use super::{cost_of, sharpened};
 
     #[test]
     fn confidence_falls_from_one_to_zero() {
@@ -59,5 +64,6 @@ mod tests {
             [sharpened(0.0), sharpened(0.5), sharpened(1.0), sharpened(1.2)],
             [1.0, 0.00390625, 0.0, 0.0]
         );
+        assert_eq!([1.0, 0.00390625, 0.0].map(cost_of), [0.0, 0.5, 1.0]);
     }
 }

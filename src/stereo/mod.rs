@@ -27,7 +27,7 @@ use crate::{Error, Result};
 use cost::Kernels;
 use level::{Level, MAX_SIDE, Weighting};
 use plane::Pinhole;
-use solver::{Pass, Solver};
+use solver::{Pass, Solver, Start};
 use state::State;
 use std::sync::Arc;
 
@@ -62,10 +62,13 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
             Some(coarse) => State::refined(&level, coarse, problem.skip.as_ref()),
         };
         let mut solver = Solver::new(kernels, &level, options.seed, view);
-        solver.score(&mut state);
         let spared = u32::from(halvings == 0 && coarsest > 0);
         for i in 0..options.iterations.saturating_sub(spared).max(1) {
-            let at_start = halvings == coarsest && i == 0;
+            let start = match (i, halvings == coarsest) {
+                (0, true) => Start::Random,
+                (0, false) => Start::Coarser,
+                _ => Start::Current,
+            };
             solver.pass(
                 &mut state,
                 Pass {
@@ -73,11 +76,11 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
                     iteration: i,
                     shift: i as usize,
                     candidates: options.candidates as usize,
-                    random: if at_start { 32 } else { 0 },
+                    random: if start == Start::Random { 32 } else { 0 },
                     random_if_bad: if halvings == coarsest { 8 } else { 4 },
                     refinements: options.refinements as usize,
                     views: options.compared_views as usize,
-                    fresh: i == 0,
+                    start,
                 },
             );
         }
@@ -125,10 +128,10 @@ pub fn refine_geometric(
     let mut state = State::from_planes(&level, problem.skip.as_ref(), |x, y| {
         let depth = previous.depth[(x, y)];
         let normal = previous.normal.as_ref().map_or([0.0, 0.0, -1.0], |n| n[(x, y)]);
-        (depth > 0.0).then(|| pinhole.plane(x as f32, y as f32, depth, normal))
+        let cost = previous.confidence.as_ref().map_or(1.0, |c| confidence::cost_of(c[(x, y)]));
+        (depth > 0.0).then(|| (pinhole.plane(x as f32, y as f32, depth, normal), cost))
     });
     let mut solver = Solver::new(Kernels::of(cpu), &level, options.seed, problem.reference.id.0);
-    solver.score(&mut state);
     solver.pass(
         &mut state,
         Pass {
@@ -140,7 +143,7 @@ pub fn refine_geometric(
             random_if_bad: 0,
             refinements: options.refinements as usize,
             views: options.compared_views as usize + 1,
-            fresh: false,
+            start: Start::Before,
         },
     );
     Ok(confidence::finish(problem, &level, &state, options.keep_cost))

@@ -32,11 +32,27 @@ pub(crate) struct Pass {
     pub(crate) random: usize,
     /// Random planes tried on tiles that match badly.
     pub(crate) random_if_bad: usize,
-    /// Source views that all planes but the first are compared with.
+    /// Source views, the best of the tile, that planes are compared with.
     pub(crate) views: usize,
-    /// Whether the visit starts from planes of a coarser level whose costs mean little.
-    pub(crate) fresh: bool,
+    /// What the estimates that the pass starts from are worth.
+    pub(crate) start: Start,
 }
+
+/// What the estimates that a pass starts from are worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Start {
+    /// Random planes without costs. Every cell's plane is tried, against all views.
+    Random,
+    /// Planes of a coarser level, with its costs. Every cell's plane is tried.
+    Coarser,
+    /// Planes of a pass without, or with other, maps of the sources; costs do not compare with the ones to come.
+    Before,
+    /// The same level and the same kind of costs.
+    Current,
+}
+
+/// Own planes are scored with so many of a tile's best views: an evaluation costs several times that of a shared plane.
+const OWN_VIEWS: usize = 3;
 
 /// Estimates one view: holds what the passes share.
 pub(crate) struct Solver<'a> {
@@ -60,16 +76,6 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Matching cost of every pixel's current plane.
-    pub(crate) fn score(&mut self, state: &mut State) {
-        for (x0, y0) in tiles(self.level, (0, 0)) {
-            self.tile.load(self.level, state, x0, y0);
-            (self.kernels.prepare)(&mut self.tile, self.level);
-            (self.kernels.score_own)(&mut self.tile, self.level);
-            self.tile.store(state);
-        }
-    }
-
     /// One pass over all tiles; every second pass goes backwards.
     pub(crate) fn pass(&mut self, state: &mut State, pass: Pass) {
         let mut order = tiles(self.level, SHIFTS[pass.shift % SHIFTS.len()]);
@@ -89,22 +95,11 @@ impl<'a> Solver<'a> {
 
     fn visit(&mut self, state: &State, pass: Pass, rng: &mut Rng) {
         (self.kernels.prepare)(&mut self.tile, self.level);
+        let ranked = self.score(pass);
         (self.kernels.begin)(&mut self.tile, self.level);
         self.tried.clear();
-        self.tile.views = self.level.sources.len();
         let first = rng.below(CELLS);
-        let own = if pass.fresh { CELLS } else { pass.candidates.min(CELLS) };
-        for k in 0..own {
-            if let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k))
-                && cost < 1.5
-            {
-                self.offer(self.tile.plane_at(x, y));
-            }
-            if k == 0 {
-                self.tile.rank_views();
-                self.tile.views = pass.views.min(self.level.sources.len());
-            }
-        }
+        self.try_own(pass, first, ranked);
         for k in 0..pass.candidates {
             if let Some(p) = candidates::beside(self.level, state, &self.tile, k, rng) {
                 self.offer(p);
@@ -122,6 +117,47 @@ impl<'a> Solver<'a> {
         for k in 0..pass.refinements {
             self.fit(first, k);
         }
+    }
+
+    /// Scores the pixels' own planes where the pass starts from others' costs. Returns whether views are in order.
+    fn score(&mut self, pass: Pass) -> bool {
+        let all = self.level.sources.len();
+        self.tile.views = all;
+        match pass.start {
+            Start::Current => return false,
+            Start::Random => {}
+            Start::Coarser | Start::Before => {
+                let Some((x, y)) = candidates::likeliest(&self.tile) else { return false };
+                let plane = self.tile.plane_at(x, y);
+                (self.kernels.survey)(&mut self.tile, self.level, plane);
+                self.tile.rank_views();
+                self.tile.views = OWN_VIEWS.min(all);
+            }
+        }
+        (self.kernels.score_own)(&mut self.tile, self.level);
+        pass.start != Start::Random
+    }
+
+    /// Tries planes of the tile's own pixels. Unless views are in order, the first one puts them in order.
+    fn try_own(&mut self, pass: Pass, first: usize, mut ranked: bool) {
+        let all = self.level.sources.len();
+        let own = match pass.start {
+            Start::Random | Start::Coarser => CELLS,
+            Start::Before | Start::Current => pass.candidates.min(CELLS),
+        };
+        for k in 0..own {
+            self.tile.views = if ranked { pass.views.min(all) } else { all };
+            if let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k))
+                && cost < 1.5
+            {
+                self.offer(self.tile.plane_at(x, y));
+            }
+            if !ranked {
+                self.tile.rank_views();
+                ranked = true;
+            }
+        }
+        self.tile.views = pass.views.min(all);
     }
 
     fn shake(&mut self, pass: Pass, first: usize, k: usize, rng: &mut Rng) {

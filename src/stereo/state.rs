@@ -10,6 +10,9 @@ use crate::scene::Grid;
 /// Pass number that keys the random numbers of the initialisation.
 const INIT_PASS: u32 = u32::MAX;
 
+/// Cost of what is not known: the largest there is.
+const UNKNOWN: f32 = 2.0;
+
 /// Estimates of a level; pixel (x, y) is at [`State::at`].
 pub(crate) struct State {
     size: Size,
@@ -41,8 +44,8 @@ impl State {
             w: zeros(),
             wx: zeros(),
             wy: zeros(),
-            cost: vec![2.0; n],
-            total: vec![2.0; n],
+            cost: vec![UNKNOWN; n],
+            total: vec![UNKNOWN; n],
             prior: zeros(),
             active: zeros(),
         };
@@ -121,23 +124,27 @@ impl State {
                 let w = p.w.clamp(level.w_range.0, level.w_range.1);
                 s.set(at, InversePlane { w, wx: p.wx * rx, wy: p.wy * ry });
                 s.prior[at] = w;
+                s.cost[at] = coarse.cost[coarse.at(ix, iy)];
             }
         }
         s
     }
 
-    /// The start of a geometric pass: the planes of an estimate; pixels without one start in the middle of the range.
+    /// The start of a geometric pass: planes and costs of an estimate; pixels without one start in the middle of the range.
     pub(crate) fn from_planes(
         level: &Level,
         skip: Option<&Grid<bool>>,
-        plane_of: impl Fn(usize, usize) -> Option<InversePlane>,
+        plane_of: impl Fn(usize, usize) -> Option<(InversePlane, f32)>,
     ) -> Self {
         let mut s = State::empty(level.size, skip);
         let middle = 0.5 * (level.w_range.0 + level.w_range.1);
         for y in 0..level.size.height as usize {
             for x in 0..level.size.width as usize {
                 let at = s.at(x as i32, y as i32);
-                s.set(at, plane_of(x, y).unwrap_or(InversePlane { w: middle, wx: 0.0, wy: 0.0 }));
+                let unknown = InversePlane { w: middle, wx: 0.0, wy: 0.0 };
+                let (plane, cost) = plane_of(x, y).unwrap_or((unknown, UNKNOWN));
+                s.set(at, plane);
+                s.cost[at] = cost;
             }
         }
         s

@@ -90,7 +90,9 @@ pub(crate) struct Kernels {
     pub(crate) prepare: fn(&mut Tile, &Level),
     /// Unit normals of the surround and total costs of the loaded estimates.
     pub(crate) begin: fn(&mut Tile, &Level),
-    /// Matching cost of every pixel's own plane.
+    /// Compares a plane anchored at the tile's centre with the views in use, to order them.
+    pub(crate) survey: fn(&mut Tile, &Level, InversePlane),
+    /// Matching cost of every pixel's own plane over the views in use.
     pub(crate) score_own: fn(&mut Tile, &Level),
     /// Tries a plane anchored at the tile's centre on all pixels; whether any took it.
     pub(crate) try_plane: fn(&mut Tile, &Level, InversePlane) -> bool,
@@ -107,6 +109,7 @@ impl Kernels {
             _ => Kernels {
                 prepare: kernels::prepare::<Baseline>,
                 begin: kernels::begin::<Baseline>,
+                survey: kernels::survey::<Baseline>,
                 score_own: kernels::score_own::<Baseline>,
                 try_plane: kernels::try_plane::<Baseline>,
             },

@@ -27,6 +27,11 @@ macro_rules! compiled_for {
             }
 
             #[target_feature(enable = $features)]
+            pub(super) fn survey(tile: &mut Tile, level: &Level, plane: InversePlane) {
+                kernels::survey::<$lanes>(tile, level, plane);
+            }
+
+            #[target_feature(enable = $features)]
             pub(super) fn score_own(tile: &mut Tile, level: &Level) {
                 kernels::score_own::<$lanes>(tile, level);
             }
@@ -40,6 +45,7 @@ macro_rules! compiled_for {
             pub(super) const KERNELS: Kernels = Kernels {
                 prepare: |tile, level| unsafe { prepare(tile, level) },
                 begin: |tile, level| unsafe { begin(tile, level) },
+                survey: |tile, level, plane| unsafe { survey(tile, level, plane) },
                 score_own: |tile, level| unsafe { score_own(tile, level) },
                 try_plane: |tile, level, plane| unsafe { try_plane(tile, level, plane) },
             };

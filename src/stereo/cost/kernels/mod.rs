@@ -47,6 +47,12 @@ pub(super) fn try_plane<L: Lanes>(tile: &mut Tile, level: &Level, plane: Inverse
     changed != 0
 }
 
+/// Compares a plane with the views in use, to order them.
+#[inline(always)]
+pub(super) fn survey<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) {
+    data_cost::<L>(tile, level, plane);
+}
+
 /// Matching cost of a plane over the sources in use, as the best and second best per pixel. False if no source sees
 /// it.
 #[inline(always)]
@@ -68,14 +74,16 @@ fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> b
             reject_outside::<L>(&scratch.valid, &mut scratch.cost);
         }
         if let Some(g) = &source.geometry {
-            for y in 0..TILE_H {
+            for y in (0..TILE_H).step_by(2) {
+                let between = y as f32 + 0.5;
                 let column = L::load(&LANE) - L::splat(CENTRE.0);
-                let w = L::splat(plane.w + plane.wy * (y as f32 - CENTRE.1)) + L::splat(plane.wx) * column;
-                let at = (*x0 as f32, (*y0 + y as i32) as f32);
+                let w = L::splat(plane.w + plane.wy * (between - CENTRE.1)) + L::splat(plane.wx) * column;
+                let at = (*x0 as f32, *y0 as f32 + between);
                 let term = geometric_term(g, at, w, level.geometric_weight);
-                let cost = L::load(&scratch.cost[y]);
-                let robust = L::splat(ROBUST_COST);
-                L::select(cost.lt(robust), cost + term, cost).store(&mut scratch.cost[y]);
+                for row in &mut scratch.cost[y..y + 2] {
+                    let cost = L::load(row);
+                    L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost).store(row);
+                }
             }
         }
         let mut sum = L::splat(0.0);

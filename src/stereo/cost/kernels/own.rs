@@ -9,15 +9,19 @@ use crate::stereo::tile::{
     Patch, REACH, ROBUST_COST, TAP_COLUMNS, TAP_ROWS, TAPS, TILE_H, TILE_W, Tile, UNSEEN,
 };
 
-/// Matching cost of every pixel's own plane.
+/// Matching cost of every pixel's own plane over the views in use.
 #[inline(always)]
 pub(in crate::stereo::cost) fn score_own<L: Lanes>(tile: &mut Tile, level: &Level) {
-    let Tile { x0, y0, patch, belief, .. } = tile;
+    let Tile { x0, y0, patch, belief, order, views, .. } = tile;
     for y in 0..TILE_H {
         let at = (*x0 as f32, (*y0 + y as i32) as f32);
         let planes = [L::load(&belief.w[y]), L::load(&belief.wx[y]), L::load(&belief.wy[y])];
         let (mut best, mut second) = ([UNSEEN; TILE_W], [UNSEEN; TILE_W]);
-        for source in level.sources.iter().filter(|s| s.width > 2 && s.height > 2) {
+        for &k in order.iter().take(*views) {
+            let source = &level.sources[k];
+            if source.width <= 2 || source.height <= 2 {
+                continue;
+            }
             let mut cost = of_row(patch, source, at, planes, y);
             if let Some(g) = &source.geometry {
                 let term = geometric_term(g, at, planes[0], level.geometric_weight);
