@@ -119,7 +119,7 @@ pub(super) fn finish<L: Lanes>(patch: &Patch, y: usize, [sum, square, cross]: &S
     let covariance = cross - L::load(&patch.mean[y]) * sum;
     let product = norm * L::load(&patch.norm[y]);
     let flat = L::splat(FLAT);
-    let correlation = (covariance / product.max(flat).sqrt()).min(L::splat(1.0));
+    let correlation = (covariance * product.max(flat).inverse_sqrt()).min(L::splat(1.0));
     let cost = (L::splat(1.0) - correlation).min(L::splat(2.0));
     let textured = L::both(flat.lt(product), (mean.abs() * L::splat(ROUNDING)).lt(norm));
     L::select(textured, cost, L::splat(ROBUST_COST))

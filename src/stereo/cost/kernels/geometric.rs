@@ -33,7 +33,8 @@ pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, (x, y): (f32, f32), w
     let here = w * r;
     let d = (there - here).abs();
     let e = d * L::splat(g.pixels_per_w);
-    let pixels = (e * (e + L::splat(2.0))).sqrt().min(L::splat(CAP));
+    let square = e * (e + L::splat(2.0));
+    let pixels = (square * square.inverse_sqrt()).min(L::splat(CAP));
     let known = L::both(L::splat(0.0).lt(p), d.lt(here * L::splat(GATE)));
     L::select(L::both(inside, known), pixels, L::splat(CAP)) * L::splat(weight)
 }

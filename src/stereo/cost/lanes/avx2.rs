@@ -155,6 +155,14 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
+    fn shifted_right<const N: u32>(a: Bits) -> Bits {
+        unsafe {
+            let n = _mm_cvtsi32_si128(N as i32);
+            (_mm256_srl_epi32(a.0, n), _mm256_srl_epi32(a.1, n))
+        }
+    }
+
+    #[inline(always)]
     fn masked(a: Bits, mask: u32) -> Bits {
         let m = Self::whole(mask);
         unsafe { (_mm256_and_si256(a.0, m.0), _mm256_and_si256(a.1, m.1)) }

@@ -134,6 +134,11 @@ impl Lanes for One {
     }
 
     #[inline(always)]
+    fn shifted_right<const N: u32>(a: __m512i) -> __m512i {
+        unsafe { _mm512_srli_epi32::<N>(a) }
+    }
+
+    #[inline(always)]
     fn masked(a: __m512i, mask: u32) -> __m512i {
         unsafe { _mm512_and_si512(a, Self::whole(mask)) }
     }

@@ -135,6 +135,11 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
+    fn shifted_right<const N: u32>(a: [u32; 16]) -> [u32; 16] {
+        a.map(|v| v >> N)
+    }
+
+    #[inline(always)]
     fn masked(a: [u32; 16], mask: u32) -> [u32; 16] {
         a.map(|v| v & mask)
     }

@@ -152,6 +152,11 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
+    fn shifted_right<const N: u32>(a: Bits) -> Bits {
+        each!(I => _mm_srl_epi32(a[I], _mm_cvtsi32_si128(N as i32)))
+    }
+
+    #[inline(always)]
     fn masked(a: Bits, mask: u32) -> Bits {
         each!(I => _mm_and_si128(a[I], _mm_set1_epi32(mask as i32)))
     }
