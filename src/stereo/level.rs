@@ -7,6 +7,7 @@ use crate::geometry::{Camera, Size};
 use crate::scene::resize_gray;
 use crate::scene::{DepthEstimate, GrayImage};
 use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
 
 /// Pixels around an image that tiles may reach into.
 pub(crate) const PAD: usize = 32;
@@ -126,11 +127,12 @@ impl Level {
                 let (gray, source_camera) = shrunk(s, halvings);
                 let (a, b) = transfer(&camera, &source_camera);
                 pixels_per_w = pixels_per_w.max(shift_per_w(&a, &b, camera.size(), w_mid));
+                let bytes = bytes(&gray);
                 Source {
                     width: gray.width(),
                     height: gray.height(),
-                    bytes: bytes(&gray),
-                    quads: quads(&gray),
+                    quads: quads(&bytes, gray.width(), gray.height()),
+                    bytes,
                     a: rows_f32(&a),
                     b: [b.x as f32, b.y as f32, b.z as f32],
                     geometry: None,
@@ -166,13 +168,13 @@ impl Level {
 }
 
 /// Image and camera divided by `2^halvings`.
-fn shrunk(image: &SourceImage, halvings: u32) -> (GrayImage, Camera) {
+fn shrunk(image: &SourceImage, halvings: u32) -> (Arc<GrayImage>, Camera) {
     if halvings == 0 {
-        return ((*image.gray).clone(), image.camera.clone());
+        return (image.gray.clone(), image.camera.clone());
     }
     let small = resize_gray(&image.gray, 1.0 / f64::from(1u32 << halvings.min(16)));
     let camera = image.camera.scaled_per_axis(small.size());
-    (small, camera)
+    (Arc::new(small), camera)
 }
 
 /// `A = K₁R₁R₀ᵀK₀⁻¹` and `b = K₁R₁(C₀ − C₁)`: the source pixel of a reference pixel at inverse depth w is `A p + b w`.
@@ -230,7 +232,7 @@ impl Source {
 
 /// Grey level from mid-grey, as the bits of a signed byte.
 fn level_byte(v: f32) -> u8 {
-    (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8 ^ 0x80
+    ((v.clamp(0.0, 1.0) * 255.0 + 0.5) as i32 ^ 0x80) as u8
 }
 
 fn bytes(gray: &GrayImage) -> Vec<u8> {
@@ -241,14 +243,16 @@ fn bytes(gray: &GrayImage) -> Vec<u8> {
 }
 
 /// Packs every pixel's grey level with those of the three pixels next to and below it.
-fn quads(gray: &GrayImage) -> Vec<u32> {
-    let (w, h) = (gray.width(), gray.height());
-    let level = |v: f32| u32::from(level_byte(v));
-    let mut out = Vec::with_capacity(w * h);
-    for y in 0..h {
-        let (top, bottom) = (gray.row(y), gray.row((y + 1).min(h - 1)));
-        let pair = |x: usize| level(top[x]) | level(bottom[x]) << 16;
-        out.extend((0..w).map(|x| pair(x) | pair((x + 1).min(w - 1)) << 8));
+fn quads(bytes: &[u8], width: usize, height: usize) -> Vec<u32> {
+    let mut out = Vec::with_capacity(width * height);
+    let row = |y: usize| &bytes[y * width..][..width];
+    for y in 0..height {
+        let (top, bottom) = (row(y), row((y + 1).min(height - 1)));
+        let pair = |(&top, &bottom): (&u8, &u8)| u32::from(top) | u32::from(bottom) << 16;
+        let here = top.iter().zip(bottom).map(pair);
+        let next = top[1..].iter().zip(&bottom[1..]).map(pair);
+        out.extend(here.zip(next).map(|(here, next)| here | next << 8));
+        out.extend(top.last().zip(bottom.last()).map(pair).map(|edge| edge | edge << 8));
     }
     out
 }
@@ -258,21 +262,18 @@ fn source_geometry(reference: &Camera, map: &DepthEstimate) -> SourceGeometry {
     let (fx, fy, cx, cy) = map.camera.intrinsics();
     let pinhole = Pinhole { fx: fx as f32, fy: fy as f32, cx: cx as f32, cy: cy as f32 };
     let width = map.depth.width();
-    let normals = map.normal.as_ref().map(|n| n.data());
-    let planes = map
-        .depth
-        .data()
-        .iter()
-        .enumerate()
-        .flat_map(|(i, &depth)| {
-            if depth <= 0.0 {
-                return [0; 2];
-            }
-            let n = normals.map_or([0.0, 0.0, -1.0], |n| n[i]);
-            let p = pinhole.plane((i % width) as f32, (i / width) as f32, depth, n);
-            [p.w.to_bits(), upper_half(p.wx) | upper_half(p.wy) << 16]
-        })
-        .collect();
+    let mut planes = vec![0; 2 * map.depth.size().area()];
+    let unknown = vec![[0.0, 0.0, -1.0]; width];
+    for (y, out) in planes.chunks_exact_mut(2 * width.max(1)).enumerate() {
+        let normals = map.normal.as_ref().map_or(&unknown[..], |n| n.row(y));
+        let pixels = map.depth.row(y).iter().zip(normals);
+        for ((x, (&depth, &normal)), out) in (0i32..).zip(pixels).zip(out.chunks_exact_mut(2)) {
+            let p = pinhole.plane(x as f32, y as f32, depth, normal);
+            let known = u32::from(depth > 0.0).wrapping_neg();
+            out[0] = p.w.to_bits() & known;
+            out[1] = (upper_half(p.wx) | upper_half(p.wy) << 16) & known;
+        }
+    }
     let baseline = (reference.center() - map.camera.center()).norm();
     let (rx, _, _, _) = reference.intrinsics();
     SourceGeometry {

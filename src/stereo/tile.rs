@@ -94,6 +94,8 @@ pub(crate) struct Halo {
     pub(crate) w: HaloMap,
     /// 1 where there is an estimate, else 0.
     pub(crate) on: HaloMap,
+    /// One over the lengths that the vectors of the tile's own pixels had.
+    pub(crate) inverse_length: TileMap,
     /// The surround's columns beside the tile once more.
     pub(crate) sides: Sides,
 }
@@ -181,6 +183,7 @@ impl Tile {
                 nz: ZERO_HALO,
                 w: ZERO_HALO,
                 on: ZERO_HALO,
+                inverse_length: ZERO_TILE,
                 sides: Sides { nx: ZERO_ROW, ny: ZERO_ROW, nz: ZERO_ROW, w: ZERO_ROW, on: ZERO_ROW },
             },
             scratch: Scratch {

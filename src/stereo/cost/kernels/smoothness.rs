@@ -21,14 +21,14 @@ struct Planes<L> {
     on: L,
 }
 
-/// Smoothness factor between planes with vectors `m` (`inverse_length` = 1/|m|) and inverse depths `w` at a
+/// Smoothness factor between planes with `unit` vectors, once `1 / inverse_length` long, and inverse depths `w` at a
 /// neighbouring pixel, and that neighbour's own plane: below 1 where they agree.
 #[inline(always)]
-fn agreement<L: Lanes>(m: [L; 3], inverse_length: L, w: L, there: Planes<L>) -> L {
-    let (one, zero, unit) = (L::splat(1.0), L::splat(0.0), there.unit);
+fn agreement<L: Lanes>(unit: [L; 3], inverse_length: L, w: L, there: Planes<L>) -> L {
+    let (one, zero) = (L::splat(1.0), L::splat(0.0));
     let r = (w - there.w) * inverse_length;
     let near = L::bell8(r * r * L::splat(DEPTH));
-    let cos = (m[0] * unit[0] + m[1] * unit[1] + m[2] * unit[2]) * inverse_length;
+    let cos = unit[0] * there.unit[0] + unit[1] * there.unit[1] + unit[2] * there.unit[2];
     let o = (one - cos).max(zero);
     let angle2 = o + o + o * o * L::splat(1.0 / 3.0);
     let parallel = L::bell8(angle2 * L::splat(NORMAL));
@@ -41,7 +41,7 @@ pub(super) fn of_candidate<L: Lanes>(tile: &mut Tile, level: &Level, p: InverseP
     let Tile { x0, y0, halo, scratch, .. } = tile;
     let m = level.pinhole.plane_vector(p, *x0 as f32 + CENTRE.0, *y0 as f32 + CENTRE.1);
     let inverse_length = 1.0 / (m[0] * m[0] + m[1] * m[1] + m[2] * m[2]).sqrt().max(1e-30);
-    let (m, inverse_length) = (m.map(L::splat), L::splat(inverse_length));
+    let (unit, inverse_length) = (m.map(|v| L::splat(v * inverse_length)), L::splat(inverse_length));
     let (column, slope) = (L::load(&LANE) - L::splat(CENTRE.0), L::splat(p.wx));
     for y in 0..TILE_H + 2 {
         let there = Planes {
@@ -51,7 +51,7 @@ pub(super) fn of_candidate<L: Lanes>(tile: &mut Tile, level: &Level, p: InverseP
         };
         let w = L::splat(p.w + p.wy * (y as f32 - 1.0 - CENTRE.1)) + slope * column;
         let mut out = [0.0; TILE_W];
-        agreement(m, inverse_length, w, there).store(&mut out);
+        agreement(unit, inverse_length, w, there).store(&mut out);
         scratch.smooth[y][1..=TILE_W].copy_from_slice(&out);
     }
     let s = &halo.sides;
@@ -62,7 +62,7 @@ pub(super) fn of_candidate<L: Lanes>(tile: &mut Tile, level: &Level, p: InverseP
     };
     let w = L::splat(p.w) + slope * L::load(&SIDE_X) + L::splat(p.wy) * L::load(&SIDE_Y);
     let mut out = [0.0; TILE_W];
-    agreement(m, inverse_length, w, there).store(&mut out);
+    agreement(unit, inverse_length, w, there).store(&mut out);
     for y in 0..TILE_H {
         scratch.smooth[y + 1][0] = out[y];
         scratch.smooth[y + 1][TILE_W + 1] = out[TILE_H + y];
@@ -89,7 +89,7 @@ const fn sides(columns: bool) -> Row {
     out
 }
 
-/// Plane vectors and their inverse lengths of planes anchored at `(x, y)`.
+/// Unit vectors of planes anchored at `(x, y)`, and one over the lengths they had.
 #[inline(always)]
 fn vectors<L: Lanes>(pinhole: &Pinhole, x: L, y: L, [w, wx, wy]: [L; 3]) -> ([L; 3], L) {
     let m = [
@@ -97,8 +97,8 @@ fn vectors<L: Lanes>(pinhole: &Pinhole, x: L, y: L, [w, wx, wy]: [L; 3]) -> ([L;
         wy * L::splat(pinhole.fy),
         w - wx * (x - L::splat(pinhole.cx)) - wy * (y - L::splat(pinhole.cy)),
     ];
-    let length = (m[0] * m[0] + m[1] * m[1] + m[2] * m[2]).sqrt().max(L::splat(1e-30));
-    (m, L::splat(1.0) / length)
+    let r = (m[0] * m[0] + m[1] * m[1] + m[2] * m[2]).max(L::splat(f32::MIN_POSITIVE)).inverse_sqrt();
+    ([m[0] * r, m[1] * r, m[2] * r], r)
 }
 
 /// Turns the surround's slopes into unit vectors, and computes every pixel's total cost.
@@ -110,9 +110,12 @@ pub(in crate::stereo::cost) fn begin<L: Lanes>(tile: &mut Tile, level: &Level) {
     for y in 0..TILE_H + 2 {
         let row = L::splat(y0 - 1.0 + y as f32);
         let planes: [L; 3] = [cut(&halo.w[y], 1), cut(&halo.nx[y], 1), cut(&halo.ny[y], 1)];
-        let (m, r) = vectors(&level.pinhole, column, row, planes);
-        for (to, m) in [&mut halo.nx, &mut halo.ny, &mut halo.nz].into_iter().zip(m) {
-            put(&mut to[y], m * r);
+        let (unit, r) = vectors(&level.pinhole, column, row, planes);
+        for (to, unit) in [&mut halo.nx, &mut halo.ny, &mut halo.nz].into_iter().zip(unit) {
+            put(&mut to[y], unit);
+        }
+        if let Some(to) = y.checked_sub(1).and_then(|y| halo.inverse_length.get_mut(y)) {
+            r.store(to);
         }
         let known = L::select(L::splat(0.0).lt(planes[0]), cut(&halo.on[y], 1), L::splat(0.0));
         put(&mut halo.on[y], known);
@@ -121,9 +124,9 @@ pub(in crate::stereo::cost) fn begin<L: Lanes>(tile: &mut Tile, level: &Level) {
     let planes = [L::load(&s.w), L::load(&s.nx), L::load(&s.ny)];
     let x = L::splat(x0 + CENTRE.0) + L::load(&SIDE_X);
     let y = L::splat(y0 + CENTRE.1) + L::load(&SIDE_Y);
-    let (m, r) = vectors(&level.pinhole, x, y, planes);
-    for (to, m) in [&mut s.nx, &mut s.ny, &mut s.nz].into_iter().zip(m) {
-        (m * r).store(to);
+    let (unit, _) = vectors(&level.pinhole, x, y, planes);
+    for (to, unit) in [&mut s.nx, &mut s.ny, &mut s.nz].into_iter().zip(unit) {
+        unit.store(to);
     }
     L::select(L::splat(0.0).lt(planes[0]), L::load(&s.on), L::splat(0.0)).store(&mut s.on);
     for y in 0..TILE_H {
@@ -135,7 +138,7 @@ pub(in crate::stereo::cost) fn begin<L: Lanes>(tile: &mut Tile, level: &Level) {
         }
     }
     for y in 0..TILE_H {
-        totals::<L>(tile, level, y);
+        totals::<L>(tile, y);
     }
 }
 
@@ -154,35 +157,35 @@ pub(super) fn refresh<L: Lanes>(tile: &mut Tile, level: &Level, changed: u32) {
         let (halo, belief) = (&mut tile.halo, &tile.belief);
         let row = L::splat((tile.y0 + y as i32) as f32);
         let planes = [L::load(&belief.w[y]), L::load(&belief.wx[y]), L::load(&belief.wy[y])];
-        let (m, r) = vectors(&level.pinhole, column, row, planes);
-        for (to, m) in [&mut halo.nx, &mut halo.ny, &mut halo.nz].into_iter().zip(m) {
-            put(&mut to[y + 1], m * r);
+        let (unit, r) = vectors(&level.pinhole, column, row, planes);
+        for (to, unit) in [&mut halo.nx, &mut halo.ny, &mut halo.nz].into_iter().zip(unit) {
+            put(&mut to[y + 1], unit);
         }
+        r.store(&mut halo.inverse_length[y]);
         put(&mut halo.w[y + 1], planes[0]);
     }
     let affected = changed | changed << 1 | changed >> 1;
     for y in (0..TILE_H).filter(|y| affected >> y & 1 != 0) {
-        totals::<L>(tile, level, y);
+        totals::<L>(tile, y);
     }
 }
 
 /// Total cost of row `y`: every pixel's own plane against its four neighbours.
 #[inline(always)]
-fn totals<L: Lanes>(tile: &mut Tile, level: &Level, y: usize) {
+fn totals<L: Lanes>(tile: &mut Tile, y: usize) {
     let (halo, belief) = (&tile.halo, &mut tile.belief);
     let (w, wx, wy) = (L::load(&belief.w[y]), L::load(&belief.wx[y]), L::load(&belief.wy[y]));
-    let column = L::splat(tile.x0 as f32) + L::load(&LANE);
-    let row = L::splat((tile.y0 + y as i32) as f32);
-    let (m, r) = vectors(&level.pinhole, column, row, [w, wx, wy]);
+    let r = L::load(&halo.inverse_length[y]);
     let there = |y: usize, x: usize| Planes {
         unit: [cut(&halo.nx[y], x), cut(&halo.ny[y], x), cut(&halo.nz[y], x)],
         w: cut(&halo.w[y], x),
         on: cut(&halo.on[y], x),
     };
-    let left = agreement(m, r, w - wx, there(y + 1, 0));
-    let right = agreement(m, r, w + wx, there(y + 1, 2));
-    let up = agreement(m, r, w - wy, there(y, 1));
-    let down = agreement(m, r, w + wy, there(y + 2, 1));
+    let unit = there(y + 1, 1).unit;
+    let left = agreement(unit, r, w - wx, there(y + 1, 0));
+    let right = agreement(unit, r, w + wx, there(y + 1, 2));
+    let up = agreement(unit, r, w - wy, there(y, 1));
+    let down = agreement(unit, r, w + wy, there(y + 2, 1));
     let smooth = (left * right) * (up * down);
     let prior = (L::load(&belief.prior_w[y]), L::load(&belief.prior_k[y]));
     total(L::load(&belief.data[y]), smooth, w, prior).store(&mut belief.total[y]);
