@@ -8,8 +8,10 @@ use super::rng::Rng;
 use super::state::State;
 use super::tile::{CENTRE, TILE_H, TILE_W, Tile};
 
-/// Planes closer than this at all four corners, in pixels of shift, count as tried.
+/// Planes of a tile's pixels closer than this at all four corners, in pixels of shift, count as the same.
 const SAME_PLANE: f32 = 0.03;
+/// The same for planes from beside the tile: they are to bring other surfaces, details are refined anyway.
+const SAME_SURFACE: f32 = 0.5;
 /// Shift of the tile grid in successive passes.
 const SHIFTS: [(i32, i32); 4] = [(0, 0), (-8, -4), (-4, -2), (-12, -6)];
 /// Mean cost above which a tile is tried with random planes.
@@ -102,7 +104,7 @@ impl<'a> Solver<'a> {
         self.try_own(pass, first, ranked);
         for k in 0..pass.candidates {
             if let Some(p) = candidates::beside(self.level, state, &self.tile, k, rng) {
-                self.offer(p);
+                self.offer(p, SAME_SURFACE);
             }
         }
         let cost = self.mean_cost();
@@ -150,7 +152,7 @@ impl<'a> Solver<'a> {
             if let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k))
                 && cost < 1.5
             {
-                self.offer(self.tile.plane_at(x, y));
+                self.offer(self.tile.plane_at(x, y), SAME_PLANE);
             }
             if !ranked {
                 self.tile.rank_views();
@@ -181,13 +183,13 @@ impl<'a> Solver<'a> {
         if cost <= 1.0
             && let Some(p) = candidates::fitted(self.level, &self.tile, x, y, radius)
         {
-            self.offer(p);
+            self.offer(p, SAME_PLANE);
         }
     }
 
-    /// Tries a plane unless nearly the same one was tried at this visit.
-    fn offer(&mut self, p: InversePlane) {
-        let same = SAME_PLANE / self.level.pixels_per_w;
+    /// Tries a plane unless one within `same` pixels of shift was tried at this visit.
+    fn offer(&mut self, p: InversePlane, same: f32) {
+        let same = same / self.level.pixels_per_w;
         let (cx, cy) = CENTRE;
         let corners = [(-cx, -cy), (cx, -cy), (-cx, cy), (cx, cy)].map(|(dx, dy)| p.moved(dx, dy).w);
         let known = |t: &[f32; 4]| t.iter().zip(&corners).all(|(a, b)| (a - b).abs() < same);

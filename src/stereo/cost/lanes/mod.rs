@@ -137,10 +137,8 @@ pub(crate) trait Lanes:
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
         let half = self * Self::splat(0.5);
-        let guess = Self::plus(
-            Self::whole(0x5f37_5a86),
-            Self::negated(Self::shifted_right::<1>(self.to_bits())),
-        );
+        let guess =
+            Self::plus(Self::whole(0x5f37_5a86), Self::negated(Self::shifted_right::<1>(self.to_bits())));
         let y = Self::from_bits(guess);
         let y = y * (Self::splat(1.5) - half * y * y);
         y * (Self::splat(1.5) - half * y * y)

@@ -46,6 +46,7 @@ fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32], seed: u32) -> Vec<Words> 
         .map(L::to_bits);
     let bits = [first, next, L::row_major(whole, whole, 17), L::masked(L::shifted_left::<3>(quad), 0xff00)]
         .into_iter()
+        .chain([L::shifted_right::<5>(quad), x.abs().inverse_sqrt().to_bits()])
         .chain([L::plus(quad, u), L::negated(quad), small.truncated(), L::place(u, v, 300)])
         .chain([L::gather(memory, index), L::bilinear(quad, u, v), L::whole(L::first(quad))]);
     numbers
@@ -146,6 +147,19 @@ fn plain_lanes_compute_what_they_say() {
         ([0.75f32.to_bits(); 16], [206; 16])
     );
     assert_eq!(Sixteen::fetch(&[1, 2, 3], [1; 16]), ([2; 16], [3; 16]));
+}
+
+/// Largest relative error of an inverse square root.
+const ROOT_TOLERANCE: f32 = 5e-6;
+
+#[test]
+fn inverse_roots_are_close_and_finite() {
+    for i in 0..4000u16 {
+        let x = 1e-30 * 1.04f32.powi(i32::from(i) % 3500);
+        let got = f32::from_bits(stored(Sixteen::splat(x).inverse_sqrt())[0]);
+        assert!((got * x.sqrt() - 1.0).abs() < ROOT_TOLERANCE, "{x}: {got}");
+    }
+    assert!(f32::from_bits(stored(Sixteen::splat(0.0).inverse_sqrt())[0]).is_finite());
 }
 
 /// The bells fall below e⁻ˣ; by how much at most.
