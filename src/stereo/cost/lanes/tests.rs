@@ -155,7 +155,7 @@ const ROOT_TOLERANCE: f32 = 5e-6;
 #[test]
 fn inverse_roots_are_close_and_finite() {
     for i in 0..4000u16 {
-        let x = 1e-30 * 1.04f32.powi(i32::from(i) % 3500);
+        let x = 1e-30 * 1.03f32.powi(i32::from(i));
         let got = f32::from_bits(stored(Sixteen::splat(x).inverse_sqrt())[0]);
         assert!((got * x.sqrt() - 1.0).abs() < ROOT_TOLERANCE, "{x}: {got}");
     }
