@@ -73,11 +73,6 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        unsafe { Two(_mm256_sqrt_ps(self.0), _mm256_sqrt_ps(self.1)) }
-    }
-
-    #[inline(always)]
     fn abs(self) -> Self {
         unsafe {
             let sign = _mm256_set1_ps(-0.0);

@@ -64,11 +64,6 @@ impl Lanes for One {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        One(unsafe { _mm512_sqrt_ps(self.0) })
-    }
-
-    #[inline(always)]
     fn abs(self) -> Self {
         One(unsafe { _mm512_abs_ps(self.0) })
     }

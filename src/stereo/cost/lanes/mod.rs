@@ -52,7 +52,6 @@ pub(crate) trait Lanes:
     fn min(self, other: Self) -> Self;
     /// The larger; `other` if either is NaN.
     fn max(self, other: Self) -> Self;
-    fn sqrt(self) -> Self;
     fn abs(self) -> Self;
     fn lt(self, other: Self) -> Self::Mask;
     fn le(self, other: Self) -> Self::Mask;

@@ -65,11 +65,6 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.map(f32::sqrt)
-    }
-
-    #[inline(always)]
     fn abs(self) -> Self {
         self.map(f32::abs)
     }

@@ -82,11 +82,6 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        Four(each!(I => _mm_sqrt_ps(self.0[I])))
-    }
-
-    #[inline(always)]
     fn abs(self) -> Self {
         Four(each!(I => _mm_andnot_ps(_mm_set1_ps(-0.0), self.0[I])))
     }
