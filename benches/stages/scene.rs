@@ -31,5 +31,6 @@ pub(crate) fn problem(maps: &MapsInMemory) -> StereoProblem {
         depth_range: maps.maps[0].estimate.depth_range,
         sparse: Vec::new(),
         skip: None,
+        regions: Vec::new(),
     }
 }

@@ -1,7 +1,7 @@
 //! What the estimator gets to know about one view.
 
 use super::prepare::Prepared;
-use super::skip::skipped;
+use super::skip::{planar, skipped};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::scene::{ImageId, Neighbor, SparseInit, SparsePoint, ViewIndex, resize_gray};
@@ -35,6 +35,7 @@ pub(super) fn stereo_problem(prepared: &Prepared, view: ViewIndex) -> Result<Ste
         depth_range,
         sparse,
         skip,
+        regions: planar(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref())?,
     })
 }
 

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geometry::{Camera, Size};
 use crate::progress::Progress;
 use crate::scene::{Grid, LabelMap, ViewIndex};
-use crate::semantics::{ClassPolicy, ClassRules, ClassTable, void_borders};
+use crate::semantics::{ClassPolicy, ClassRules, ClassTable, PlanarRegion, planar_regions, void_borders};
 use crate::store::images::image_size;
 use crate::store::import::LoadedScene;
 use crate::store::labels::{LabelRequest, LabelStore};
@@ -145,4 +145,21 @@ pub(super) fn skipped(
     let Some(Regions { map, policy }) = regions(view, size, masks, labels)? else { return Ok(None) };
     let skip: Vec<bool> = map.data().iter().map(|&id| !policy.is_estimated(id)).collect();
     Ok(Grid::from_vec(size, skip).filter(|skip| skip.data().contains(&true)))
+}
+
+/// The regions of a view whose pixels are drawn towards planes.
+///
+/// # Errors
+/// As [`regions`].
+pub(super) fn planar(
+    view: ViewIndex,
+    size: Size,
+    masks: Option<&Masks>,
+    labels: Option<&Labels>,
+) -> Result<Vec<PlanarRegion>> {
+    if !labels.is_some_and(|labels| labels.policy().has_plane_priors()) {
+        return Ok(Vec::new());
+    }
+    let regions = regions(view, size, masks, labels)?;
+    Ok(regions.map_or_else(Vec::new, |regions| planar_regions(&regions.map, regions.policy)))
 }

@@ -2,6 +2,7 @@
 
 use super::classes::{Class, ClassId, ClassTable, plain_class};
 use super::names::normalized;
+use super::regions::PlanePrior;
 use crate::{Error, Result};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -17,7 +18,18 @@ pub(super) enum SharedColors {
 }
 
 const TABLE_KEYS: [&str; 4] = ["name", "void-name", "void-colors", "class"];
-const CLASS_KEYS: [&str; 7] = ["id", "name", "color", "keep", "estimate", "surface", "las"];
+const CLASS_KEYS: [&str; 10] = [
+    "id",
+    "name",
+    "color",
+    "keep",
+    "estimate",
+    "surface",
+    "las",
+    "prior",
+    "max-normal-deviation",
+    "min-region",
+];
 
 /// Reads a class table from TOML; `path` is for messages and, without a `name` key, for the table's name.
 pub(super) fn parse(text: &str, path: &Path, shared: SharedColors) -> Result<ClassTable> {
@@ -84,7 +96,33 @@ fn parse_class(source: Source<'_>, value: &Spanned<DeValue<'_>>, void_colors: &[
     let las =
         keys.value("las").map(|value| source.integer("class.las", value, 0..=u8::MAX.into())).transpose()?;
     class.las = las.map(|code| code as u8);
+    class.plane = parse_plane(source, &keys)?;
     Ok(class)
+}
+
+/// The keys about the class's planes.
+fn parse_plane(source: Source<'_>, keys: &Keys<'_, '_>) -> Result<Option<PlanePrior>> {
+    let mut plane = PlanePrior::default();
+    let Some(prior) = keys.value("prior") else {
+        let without =
+            ["max-normal-deviation", "min-region"].into_iter().find_map(|key| Some((key, keys.value(key)?)));
+        return without.map_or(Ok(None), |(key, value)| {
+            Err(source.error(value.span(), &format!("key class.{key} needs prior = \"plane\" in this class")))
+        });
+    };
+    let name = source.string("class.prior", prior)?;
+    if name != "plane" {
+        return Err(
+            source.error(prior.span(), &format!("key class.prior: {name:?} is unknown, there is \"plane\""))
+        );
+    }
+    if let Some(value) = keys.value("max-normal-deviation") {
+        plane.max_normal_deviation = source.angle("class.max-normal-deviation", value)?;
+    }
+    if let Some(value) = keys.value("min-region") {
+        plane.min_region = source.integer("class.min-region", value, 1..=u32::MAX.into())? as u32;
+    }
+    Ok(Some(plane))
 }
 
 /// A name must survive a `comment` line of a PLY header and a comma-separated list.
@@ -198,6 +236,18 @@ impl Source<'_> {
         }
     }
 
+    /// An angle above 0, at most 90 degrees.
+    fn angle(self, key: &str, value: &Spanned<DeValue<'_>>) -> Result<f32> {
+        let degrees: Option<f32> = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse().ok(),
+            DeValue::Integer(integer) => integer.as_str().parse().ok(),
+            _ => return Err(self.mismatch(key, value, "a number of degrees")),
+        };
+        degrees
+            .filter(|degrees| *degrees > 0.0 && *degrees <= 90.0)
+            .ok_or_else(|| self.error(value.span(), &format!("key {key}: give degrees above 0, at most 90")))
+    }
+
     fn array<'v, 'i>(
         self,
         key: &str,
@@ -309,7 +359,8 @@ mod tests {
     #[test]
     fn a_full_table_is_read() {
         let text = "name = \"facade\"\nvoid-name = \"other\"\nvoid-colors = [[9, 9, 9]]\n[[class]]\nid = 65535\nname = \"sky\"\n\
-                    color = [255, 255, 0]\nkeep = false\nestimate = true\nsurface = false\nlas = 6\n[[class]]\nid = 0x1\nname = \"wall\"\n";
+                    color = [255, 255, 0]\nkeep = false\nestimate = true\nsurface = false\nlas = 6\n\
+                    prior = \"plane\"\nmax-normal-deviation = 12.5\nmin-region = 40\n[[class]]\nid = 0x1\nname = \"wall\"\n";
         let table = ClassTable::from_toml(text, Path::new("t.toml")).unwrap();
         assert_eq!(table.name(), "facade");
         let [wall, sky] = table.classes() else { panic!("{table:?}") };
@@ -323,12 +374,28 @@ mod tests {
             estimate: Some(true),
             surface: false,
             las: Some(6),
+            plane: Some(PlanePrior { max_normal_deviation: 12.5, min_region: 40 }),
         };
         assert_eq!(*sky, expected);
         assert_eq!(table.resolve("Other").unwrap(), ClassId::VOID);
         assert_eq!(table.colors(), [([9, 9, 9], ClassId::VOID), ([255, 255, 0], ClassId(65535))].into());
         let unnamed = ClassTable::from_toml(WALL, Path::new("dir/my classes.toml")).unwrap();
         assert_eq!(unnamed.name(), "my classes");
+    }
+
+    #[test]
+    fn planes_have_defaults_and_are_off_unless_asked_for() {
+        let plane = |text: &str| {
+            let table = ClassTable::from_toml(&format!("{WALL}{text}"), Path::new("t.toml")).unwrap();
+            table.classes()[0].plane
+        };
+        assert_eq!(plane(""), None);
+        assert_eq!(plane("prior = \"plane\"\n"), Some(PlanePrior::default()));
+        let angle = plane("prior = \"plane\"\nmax-normal-deviation = 45\n").unwrap().max_normal_deviation;
+        assert_eq!(angle, 45.0);
+        assert!(ClassTable::builtin_names().all(|name| {
+            ClassTable::builtin(name).unwrap().classes().iter().all(|class| class.plane.is_none())
+        }));
     }
 
     #[test]
@@ -373,6 +440,32 @@ mod tests {
             (
                 "[[class]]\nid = 1\nname = \"a\"\nlas = 256\n".into(),
                 "line 4: key class.las: 256 is not in 0..=255",
+            ),
+            (format!("{WALL}prior = 1\n"), "line 5: key class.prior: integer where a string belongs"),
+            (
+                format!("{WALL}prior = \"sphere\"\n"),
+                "line 5: key class.prior: \"sphere\" is unknown, there is",
+            ),
+            (format!("{WALL}min-region = 9\n"), "line 5: key class.min-region needs prior = \"plane\""),
+            (
+                format!("{WALL}max-normal-deviation = 9\n"),
+                "line 5: key class.max-normal-deviation needs prior = \"plane\"",
+            ),
+            (
+                format!("{WALL}prior = \"plane\"\nmin-region = 0\n"),
+                "line 6: key class.min-region: 0 is not in 1..=4294967295",
+            ),
+            (
+                format!("{WALL}prior = \"plane\"\nmax-normal-deviation = 90.5\n"),
+                "line 6: key class.max-normal-deviation: give degrees above 0, at most 90",
+            ),
+            (
+                format!("{WALL}prior = \"plane\"\nmax-normal-deviation = nan\n"),
+                "line 6: key class.max-normal-deviation: give degrees",
+            ),
+            (
+                format!("{WALL}prior = \"plane\"\nmax-normal-deviation = \"20\"\n"),
+                "line 6: key class.max-normal-deviation: string where a number of degrees belongs",
             ),
             (
                 format!("void-colors = [[1, 2, 3]]\n{WALL}"),

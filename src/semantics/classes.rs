@@ -1,5 +1,6 @@
 //! The classes that label maps speak of.
 
+use super::regions::PlanePrior;
 use super::{class_file, names};
 use crate::{Error, Result};
 use std::borrow::Cow;
@@ -51,6 +52,8 @@ pub struct Class {
     pub surface: bool,
     /// ASPRS LAS classification code.
     pub las: Option<u8>,
+    /// The planes that pixels of this class are drawn towards; `None`: none.
+    pub plane: Option<PlanePrior>,
 }
 
 /// The classes of a set of label maps, in order of their ids.
@@ -283,7 +286,7 @@ impl ClassTable {
 
 /// A class with everything but id and name at its default.
 pub(super) fn plain_class(id: ClassId, name: String) -> Class {
-    Class { id, name, color: None, keep: true, estimate: None, surface: true, las: None }
+    Class { id, name, color: None, keep: true, estimate: None, surface: true, las: None, plane: None }
 }
 
 /// One colour per class: its own where it has one, else the palette's, moved on where that one is taken.

@@ -1,6 +1,6 @@
 //! What to do with each class.
 
-use super::{ClassId, ClassTable};
+use super::{ClassId, ClassTable, PlanePrior};
 use crate::Result;
 
 /// How labels restrict which pixels become one point.
@@ -84,6 +84,8 @@ pub struct ClassPolicy {
     estimated: Vec<bool>,
     /// Classes without a surface, where labels are compared.
     without_surface: Vec<ClassId>,
+    /// Classes whose pixels are drawn towards planes.
+    planar: Vec<(ClassId, PlanePrior)>,
     others_kept: bool,
     consistency: Consistency,
     border: u32,
@@ -95,6 +97,7 @@ impl Default for ClassPolicy {
             kept: Vec::new(),
             estimated: Vec::new(),
             without_surface: Vec::new(),
+            planar: Vec::new(),
             others_kept: true,
             consistency: Consistency::Off,
             border: 0,
@@ -137,8 +140,9 @@ impl ClassPolicy {
         let is_surface = |id: &ClassId| wanted.contains(id) || rules.consistency == Consistency::Off;
         let without_surface = table.classes().iter().filter(|class| !class.surface).map(|class| class.id);
         let without_surface = without_surface.filter(|id| !is_surface(id)).collect();
+        let planar = table.classes().iter().filter_map(|class| Some((class.id, class.plane?))).collect();
         let (consistency, border) = (rules.consistency, rules.border);
-        Ok(ClassPolicy { kept, estimated, without_surface, others_kept, consistency, border })
+        Ok(ClassPolicy { kept, estimated, without_surface, planar, others_kept, consistency, border })
     }
 
     /// The same, but `id` is neither kept nor estimated.
@@ -181,6 +185,17 @@ impl ClassPolicy {
         } else {
             Agreement::Differs
         }
+    }
+
+    /// The planes that pixels of a class are drawn towards, if any.
+    pub fn plane_prior(&self, id: impl Into<ClassId>) -> Option<PlanePrior> {
+        let id = id.into();
+        self.planar.iter().find(|(class, _)| *class == id).map(|(_, prior)| *prior)
+    }
+
+    /// Whether pixels of any class are drawn towards planes.
+    pub fn has_plane_priors(&self) -> bool {
+        !self.planar.is_empty()
     }
 
     /// How labels restrict fusion.

@@ -43,7 +43,7 @@ pub(crate) fn finish(problem: &StereoProblem, level: &Level, state: &State, keep
 }
 
 /// Confidence of a matching cost.
-fn sharpened(cost: f32) -> f32 {
+pub(crate) fn sharpened(cost: f32) -> f32 {
     let c = (1.0 - cost).clamp(0.0, 1.0);
     let c = (c * c) * (c * c);
     c * c

@@ -10,7 +10,9 @@ mod cost;
 mod level;
 mod options;
 mod plane;
+mod plane_fit;
 mod problem;
+mod region_planes;
 mod rng;
 mod solver;
 mod state;
@@ -27,6 +29,7 @@ use crate::{Error, Result};
 use cost::Kernels;
 use level::{Level, MAX_SIDE, Weighting};
 use plane::Pinhole;
+use region_planes::draw_to_planes;
 use solver::{Pass, Solver, Start};
 use state::State;
 use std::sync::Arc;
@@ -86,7 +89,11 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
         }
         finished = (halvings == 0).then(|| {
             let relaxed = if options.geometric_iterations > 0 { RELAXED } else { 1.0 };
-            confidence::finish(problem, &level, &state, options.keep_cost * relaxed)
+            let mut estimate = confidence::finish(problem, &level, &state, options.keep_cost * relaxed);
+            if options.geometric_iterations == 0 {
+                draw_to_planes(problem, kernels, &level, &state, options.seed, &mut estimate);
+            }
+            estimate
         });
         previous = Some(state);
     }
@@ -131,7 +138,8 @@ pub fn refine_geometric(
         let cost = previous.confidence.as_ref().map_or(1.0, |c| confidence::cost_of(c[(x, y)]));
         (depth > 0.0).then(|| (pinhole.plane(x as f32, y as f32, depth, normal), cost))
     });
-    let mut solver = Solver::new(Kernels::of(cpu), &level, options.seed, problem.reference.id.0);
+    let kernels = Kernels::of(cpu);
+    let mut solver = Solver::new(kernels, &level, options.seed, problem.reference.id.0);
     solver.pass(
         &mut state,
         Pass {
@@ -146,7 +154,11 @@ pub fn refine_geometric(
             start: Start::Before,
         },
     );
-    Ok(confidence::finish(problem, &level, &state, options.keep_cost))
+    let mut estimate = confidence::finish(problem, &level, &state, options.keep_cost);
+    if pass + 1 == options.geometric_iterations as usize {
+        draw_to_planes(problem, kernels, &level, &state, options.seed, &mut estimate);
+    }
+    Ok(estimate)
 }
 
 /// Number of halvings of the coarsest level: as many as asked for, while the image stays large enough.

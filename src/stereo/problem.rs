@@ -3,6 +3,7 @@
 use crate::geometry::Camera;
 pub use crate::scene::SparsePoint;
 use crate::scene::{GrayImage, Grid, ImageId};
+use crate::semantics::PlanarRegion;
 use std::sync::Arc;
 
 /// A grey image with its camera at the size of that image.
@@ -31,4 +32,6 @@ pub struct StereoProblem {
     pub sparse: Vec<SparsePoint>,
     /// Pixels that get no depth (masked, or of a class that is not estimated).
     pub skip: Option<Grid<bool>>,
+    /// Regions of the reference whose pixels are drawn towards planes.
+    pub regions: Vec<PlanarRegion>,
 }

@@ -22,7 +22,7 @@ pub(in crate::stereo) fn slanted(o: Vector3<f64>, d: Vector3<f64>) -> f64 {
     plane_hit(o, d, Vector3::new(0.45, -0.3, 1.0), 4.0)
 }
 
-fn sphere_before_wall(o: Vector3<f64>, d: Vector3<f64>) -> f64 {
+pub(in crate::stereo) fn sphere_before_wall(o: Vector3<f64>, d: Vector3<f64>) -> f64 {
     let wall = plane_hit(o, d, Vector3::z(), 5.0);
     let (c, r) = (Vector3::new(0.1, 0.0, 4.4), 1.0);
     let oc = o - c;
@@ -89,6 +89,7 @@ pub(in crate::stereo) fn problem(surface: Surface, reference: usize) -> (StereoP
         depth_range: (2.0, 9.0),
         sparse: Vec::new(),
         skip: None,
+        regions: Vec::new(),
     };
     (problem, depth)
 }

@@ -118,6 +118,7 @@ fn listed_class(comment: &str) -> Option<Class> {
         estimate: None,
         surface: true,
         las: None,
+        plane: None,
     })
 }
 
