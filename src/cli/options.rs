@@ -87,7 +87,8 @@ pub(crate) struct FusionOptions {
     /// The filter across views [default: unbiased in semvs, openmvs in DensifyPointCloud]
     #[arg(long, value_name = "FILTER", value_enum)]
     pub(crate) filter: Option<FilterKind>,
-    /// Fewest images that must agree on a point; below 2 every depth becomes a point
+    /// Fewest images that must agree on a point (unless given, 2 in semvs where they must agree on its class, too); below 2 every
+    /// depth becomes a point
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub(crate) number_views_fuse: u32,
     /// Colours: 0 = none, 1 = of the nearest image after fusion, 2 = averaged during fusion

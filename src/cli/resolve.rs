@@ -178,19 +178,22 @@ impl<'a> Resolver<'a> {
         FilterJob::from_bits(bits, across, options)
     }
 
-    /// Fusion.
+    /// Fusion; `agreeing_on_class`: the fewest images of a point where labels are compared, if not what is typed.
     ///
     /// # Errors
     /// Values out of range.
-    pub(crate) fn fusion(&self) -> Result<FusionOptions> {
+    pub(crate) fn fusion(&self, agreeing_on_class: Option<u32>) -> Result<FusionOptions> {
         let typed = &self.options.fusion;
+        let compared = has_labels(&self.options.labels.input)
+            && rules(&self.options.labels.input).consistency != Consistency::Off;
+        let fewest = agreeing_on_class.filter(|_| compared).unwrap_or(typed.number_views_fuse);
         let source = |level: u32, option: &str| {
             AttributeSource::from_level(level).ok_or_else(|| {
                 Error::invalid(format!("{option} {level}: give 0 (none), 1 (after fusion) or 2"))
             })
         };
         let options = FusionOptions {
-            number_views_fuse: typed.number_views_fuse,
+            number_views_fuse: fewest,
             depth_diff_threshold: self.config.depth_diff_threshold,
             normal_diff_threshold_deg: self.config.normal_diff_threshold_deg,
             estimate_colors: source(typed.estimate_colors, "--estimate-colors")?,
@@ -251,6 +254,11 @@ pub(crate) fn rules(typed: &LabelInput) -> ClassRules {
     }
 }
 
+/// Whether labels take part.
+fn has_labels(typed: &LabelInput) -> bool {
+    typed.label_path.is_some() || typed.class_table.is_some()
+}
+
 /// The labels that the options ask for.
 ///
 /// # Errors
@@ -263,7 +271,7 @@ pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Re
         missing: missing(typed.missing_labels),
     };
     let rules = rules(typed);
-    if sources.are_given() {
+    if has_labels(typed) {
         return Ok(Some(LabelJob { sources, rules }));
     }
     let asked = [

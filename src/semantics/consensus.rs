@@ -17,14 +17,14 @@ pub struct ConsensusOptions {
     /// Distance from a class border in depth-map pixels, up to 255, from which a pixel has a whole vote; nearer ones have
     /// less in proportion. Default 4.
     pub border: u8,
-    /// Vote, 0..1, of a pixel without depth, which may see something in front of the surface. Default 0: pixels of classes
-    /// that are not estimated have no depth, and what is excluded must not take the rest with it.
+    /// Vote, 0..1, of a pixel without depth, which may see something in front of the surface. Default 0.2: pixels of classes
+    /// that are not estimated have no depth, and would not be heard where one view alone mistakes them for others.
     pub without_depth: f32,
 }
 
 impl Default for ConsensusOptions {
     fn default() -> Self {
-        ConsensusOptions { max_depth_diff: 0.01, border: 4, without_depth: 0.0 }
+        ConsensusOptions { max_depth_diff: 0.01, border: 4, without_depth: 0.2 }
     }
 }
 

@@ -39,11 +39,6 @@ pub struct LabelSources {
 }
 
 impl LabelSources {
-    /// Whether labels take part at all.
-    pub fn are_given(&self) -> bool {
-        self.label_path.is_some() || self.class_table.is_some()
-    }
-
     /// The class table, as far as it is known without label maps.
     ///
     /// # Errors

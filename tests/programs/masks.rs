@@ -24,7 +24,9 @@ fn masks_and_labels_give_the_same_depths_and_points() {
     pictures(&scratch, "masks", ".mask.png", (400, 300), MASKED);
     pictures(&scratch, "ids", ".png", (400, 300), MASKED);
     let run = |name: &str, words: &str| {
-        let all = format!("densify scene.mvs -o {name}/x.ply -w {name} {SMALL} {QUICK} {words}");
+        let all = format!(
+            "densify scene.mvs -o {name}/x.ply -w {name} --number-views-fuse 3 {SMALL} {QUICK} {words}"
+        );
         scratch.semvs(&all).ok();
     };
     run("m", &format!("--mask-path masks --ignore-mask-label {MASKED}"));

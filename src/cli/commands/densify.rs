@@ -1,7 +1,8 @@
 //! `semvs densify`.
 
 use super::{
-    cloud_path, conclude, default_cloud, effective, is_typed, outputs, own_folder, resolver, spare_workspace,
+    agreeing_on_class, cloud_path, conclude, default_cloud, effective, is_typed, outputs, own_folder,
+    resolver, spare_workspace,
 };
 use crate::cli::listen::Recorder;
 use crate::cli::options::FilterKind;
@@ -20,7 +21,7 @@ pub(crate) fn densify(args: &DensifyArgs, typed: &ArgMatches, recorder: &Arc<Rec
     let job = job(args, typed, &resolver(&args.shared, recorder)?)?;
     let report = pipeline::densify(&job, resolve::cpu()?, &recorder.progress())?;
     let mut options = effective::options_in_effect::<DensifyArgs>(typed);
-    effective::resolve(&mut options, &job.input, &job.outputs, None, Some(&job.filter));
+    effective::resolve(&mut options, &job.input, &job.outputs, None, Some(&job.filter), &job.fusion);
     conclude(report, "semvs densify", options, recorder, job.outputs.report.as_deref())
 }
 
@@ -61,7 +62,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         filter: resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?,
         depth_maps_only,
         remove_depth_maps: shared.fusion.remove_dmaps,
-        fusion: resolver.fusion()?,
+        fusion: resolver.fusion(agreeing_on_class(typed))?,
         outputs,
     })
 }

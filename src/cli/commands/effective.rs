@@ -1,5 +1,6 @@
 //! Every option in effect, for reports.
 
+use crate::fusion::FusionOptions;
 use crate::pipeline::{AcrossViews, FilterJob, Outputs, SceneJob};
 use crate::store::cloud::PlyLayout;
 use clap::{ArgMatches, Args, Command};
@@ -43,6 +44,7 @@ pub(crate) fn resolve(
     outputs: &Outputs,
     depth_maps: Option<&Path>,
     filter: Option<&FilterJob>,
+    fusion: &FusionOptions,
 ) {
     let path = |path: &Path| Value::String(path.display().to_string());
     let layout = match outputs.layout {
@@ -63,6 +65,7 @@ pub(crate) fn resolve(
         meant.push(("label-consistency", labels.rules.consistency.name().into()));
         meant.push(("label-votes", labels.rules.voters.name().into()));
     }
+    options.insert("number-views-fuse".to_owned(), fusion.number_views_fuse.into());
     if let Some(filter) = filter {
         let bits = [filter.speckles, filter.gaps, filter.across.is_some()];
         let bits = bits.iter().enumerate().map(|(i, &on)| u32::from(on) << i).sum::<u32>();

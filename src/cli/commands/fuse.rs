@@ -1,6 +1,9 @@
 //! `semvs fuse`.
 
-use super::{cloud_path, conclude, default_cloud, effective, is_typed, outputs, resolver, spare_workspace};
+use super::{
+    agreeing_on_class, cloud_path, conclude, default_cloud, effective, is_typed, outputs, resolver,
+    spare_workspace,
+};
 use crate::cli::listen::Recorder;
 use crate::cli::resolve::Resolver;
 use crate::cli::semvs_args::FuseArgs;
@@ -20,7 +23,7 @@ pub(crate) fn fuse(args: &FuseArgs, typed: &ArgMatches, recorder: &Arc<Recorder>
         DepthMapsJob::Folder(folder) => Some(folder.as_path()),
         DepthMapsJob::Colmap(_) => None,
     };
-    effective::resolve(&mut options, &job.input, &job.outputs, folder, None);
+    effective::resolve(&mut options, &job.input, &job.outputs, folder, None, &job.fusion);
     conclude(report, "semvs fuse", options, recorder, job.outputs.report.as_deref())
 }
 
@@ -39,7 +42,7 @@ fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<F
             .then(|| resolver.resolution())
             .transpose()?,
         depth_maps: depth_maps(args),
-        fusion: resolver.fusion()?,
+        fusion: resolver.fusion(agreeing_on_class(typed))?,
         outputs,
     })
 }

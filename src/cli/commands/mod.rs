@@ -128,6 +128,12 @@ fn outputs(typed: &LabelOutput, cloud: PathBuf, scene: Option<PathBuf>) -> Outpu
     }
 }
 
+/// Fewest images of a point where they must agree on its class, too; `None`: as typed.
+fn agreeing_on_class(typed: &ArgMatches) -> Option<u32> {
+    const FEWEST: u32 = 2;
+    (!is_typed(typed, "number-views-fuse")).then_some(FEWEST)
+}
+
 /// Completes the report of `program`, prints its summary, and writes it to `path`.
 fn conclude(
     mut report: RunReport,

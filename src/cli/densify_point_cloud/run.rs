@@ -161,7 +161,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         filter: resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
         depth_maps_only: shared.estimation.fusion_mode == 1,
         remove_depth_maps: shared.fusion.remove_dmaps,
-        fusion: resolver.fusion()?,
+        fusion: resolver.fusion(None)?,
         outputs: Outputs {
             scene: Some(with_suffix(&base, ".mvs")),
             archive,
@@ -223,7 +223,14 @@ fn conclude(mut report: RunReport, job: &DensifyJob, typing: &Typing, log: &Log)
         report.program = "DensifyPointCloud".to_owned();
         report.version = env!("CARGO_PKG_VERSION").to_owned();
         report.options = typing.options.clone();
-        effective::resolve(&mut report.options, &job.input, &job.outputs, None, Some(&job.filter));
+        effective::resolve(
+            &mut report.options,
+            &job.input,
+            &job.outputs,
+            None,
+            Some(&job.filter),
+            &job.fusion,
+        );
         write_report(&report, path)?;
     }
     Ok(())
