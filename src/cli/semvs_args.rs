@@ -246,6 +246,9 @@ pub(crate) struct EvaluateArgs {
     /// Also accuracy and completeness of every true class
     #[arg(long)]
     pub(crate) per_class: bool,
+    /// Draw how right labels are by their label_confidence
+    #[arg(long, value_name = "FILE.png")]
+    pub(crate) reliability_diagram: Option<PathBuf>,
     /// As JSON
     #[arg(long)]
     pub(crate) json: bool,

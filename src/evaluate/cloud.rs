@@ -15,6 +15,8 @@ pub struct LabelledPoints {
     pub positions: Vec<[f64; 3]>,
     /// Class id of every point, if the cloud has labels.
     pub labels: Option<Vec<u16>>,
+    /// How sure the label of every point is, 0..1, if the cloud says so.
+    pub label_confidences: Option<Vec<f32>>,
 }
 
 impl LabelledPoints {
@@ -28,12 +30,17 @@ impl LabelledPoints {
         LabelledPoints {
             positions: indices.iter().map(|&i| self.positions[i]).collect(),
             labels: self.labels.as_ref().map(|l| indices.iter().map(|&i| l[i]).collect()),
+            label_confidences: self
+                .label_confidences
+                .as_ref()
+                .map(|c| indices.iter().map(|&i| c[i]).collect()),
         }
     }
 
     /// The finite points on one of `classes`; on any class if there are none.
     fn of_classes(&self, classes: &[u16], whose: &str) -> Result<Self> {
-        if self.labels.as_ref().is_some_and(|l| l.len() != self.positions.len()) {
+        let counts = [self.labels.as_ref().map(Vec::len), self.label_confidences.as_ref().map(Vec::len)];
+        if counts.into_iter().flatten().any(|count| count != self.positions.len()) {
             return Err(Error::invalid(format!("the {whose} has labels for some of its points only")));
         }
         let finite = |i: usize| self.positions[i].iter().all(|v| v.is_finite());
@@ -279,7 +286,11 @@ mod tests {
 
     fn plane(step: f64, z: f64, label: u16) -> LabelledPoints {
         let positions = (0..400).map(|i| [f64::from(i % 20) * step, f64::from(i / 20) * step, z]);
-        LabelledPoints { positions: positions.collect(), labels: Some(vec![label; 400]) }
+        LabelledPoints {
+            positions: positions.collect(),
+            labels: Some(vec![label; 400]),
+            ..Default::default()
+        }
     }
 
     fn options(thresholds: &[f64]) -> CloudScoreOptions {
@@ -302,6 +313,7 @@ mod tests {
         let cloud = LabelledPoints {
             positions: vec![[0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [-0.1, 0.0, 0.0], [f64::NAN, 0.0, 0.0]],
             labels: Some(vec![5, 6, 7, 8]),
+            ..Default::default()
         };
         let finite = cloud.of_classes(&[], "cloud").unwrap();
         let thin = thinned(&finite, 1.0);

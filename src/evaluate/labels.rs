@@ -1,6 +1,7 @@
 //! How well the labels of a cloud agree with those of the truth.
 
 use super::cloud::{LabelledPoints, distance};
+use super::reliability::{ReliabilityBin, reliability};
 use super::rounded_option;
 use crate::geometry::Nearest;
 use serde::Serialize;
@@ -19,6 +20,9 @@ pub struct LabelScores {
     /// Intersection over union of every truth class except void (0) and ignored ones; `None` if no point has or should
     /// have the label.
     pub iou: BTreeMap<u16, Option<f64>>,
+    /// By label confidence, ascending, if the cloud has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reliability: Option<Vec<ReliabilityBin>>,
 }
 
 /// `None` unless both clouds have labels.
@@ -49,5 +53,6 @@ pub(super) fn label_scores(
     let iou: BTreeMap<u16, Option<f64>> = classes.into_iter().map(|c| (c, iou(c))).collect();
     let known: Vec<f64> = iou.values().copied().flatten().collect();
     let miou = (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
-    Some(LabelScores { accuracy: ratio(sum(&|h, w| h == w), sum(&|_, _| true)), miou, iou })
+    let accuracy = ratio(sum(&|h, w| h == w), sum(&|_, _| true));
+    Some(LabelScores { accuracy, miou, iou, reliability: reliability(cloud, truth, to_truth, radius) })
 }

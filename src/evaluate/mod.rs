@@ -4,6 +4,7 @@ mod cloud;
 mod compare;
 mod labels;
 mod maps;
+mod reliability;
 
 pub use cloud::{
     ClassScore, ClassScores, CloudScoreOptions, CloudScores, DistanceScore, LabelledPoints, cloud_scores,
@@ -16,6 +17,7 @@ pub use compare::{
 };
 pub use labels::LabelScores;
 pub use maps::{MapScoreOptions, MapScores, map_scores};
+pub use reliability::ReliabilityBin;
 
 /// `value` to so many decimals.
 fn round_to<const DECIMALS: i32>(value: f64) -> f64 {

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::evaluate::{CloudScoreOptions, CloudScores, LabelledPoints, cloud_scores};
+use crate::store::reliability_diagram::{Bar, write_reliability_diagram};
 use semvs_formats::{Limits, ply};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -15,12 +16,15 @@ pub struct EvaluateJob {
     pub truth: PathBuf,
     /// What to score.
     pub options: CloudScoreOptions,
+    /// A picture (.png) of how right labels are by their confidence.
+    pub reliability_diagram: Option<PathBuf>,
 }
 
 /// Runs `job`.
 ///
 /// # Errors
-/// An unreadable file, a cloud without points, options that do not fit the clouds.
+/// An unreadable file, a cloud without points, options that do not fit the clouds, a picture that cannot be written or
+/// drawn.
 pub fn evaluate(job: &EvaluateJob) -> Result<CloudScores> {
     job.options.check()?;
     let truth = read_points(&job.truth)?;
@@ -28,6 +32,17 @@ pub fn evaluate(job: &EvaluateJob) -> Result<CloudScores> {
     let scores = cloud_scores(&cloud, &truth, &job.options)?;
     if scores.points == 0 {
         return Err(Error::content(&job.cloud, "the cloud has no points to judge"));
+    }
+    if let Some(path) = &job.reliability_diagram {
+        let bins = scores.labels.as_ref().and_then(|labels| labels.reliability.as_deref());
+        let bins = bins.ok_or_else(|| {
+            Error::content(
+                &job.cloud,
+                "no reliability diagram: the cloud needs label and label_confidence, the truth label",
+            )
+        })?;
+        let bars: Vec<Bar> = bins.iter().map(|b| Bar { from: b.from, to: b.to, right: b.right }).collect();
+        write_reliability_diagram(path, &bars)?;
     }
     Ok(scores)
 }
@@ -43,5 +58,6 @@ fn read_points(path: &Path) -> Result<LabelledPoints> {
         false => cloud.positions_f64,
     };
     let labels = (!cloud.labels.is_empty()).then_some(cloud.labels);
-    Ok(LabelledPoints { positions, labels })
+    let label_confidences = (!cloud.label_confidence.is_empty()).then_some(cloud.label_confidence);
+    Ok(LabelledPoints { positions, labels, label_confidences })
 }

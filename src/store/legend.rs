@@ -1,16 +1,14 @@
 //! A picture that says what class colours mean.
 
-use super::atomic::AtomicFile;
 use super::cloud::ClassPoints;
-use crate::error::{Error, Result};
+use super::drawing::{put_text, text_width, write_picture};
+use crate::error::Result;
 use crate::geometry::Size;
 use crate::scene::ColorImage;
 use crate::semantics::{ClassId, ClassTable};
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const FONT: RasterHeight = RasterHeight::Size20;
 /// Pixels from line to line.
 const LINE: usize = 30;
 /// Pixels about everything.
@@ -33,25 +31,13 @@ pub(super) fn write_legend(
     table: &ClassTable,
     classes: &BTreeMap<ClassId, ClassPoints>,
 ) -> Result<()> {
-    let image = draw(table, classes);
-    let failed = |e: png::EncodingError| match e {
-        png::EncodingError::IoError(e) => Error::io(path, "write", e),
-        e => Error::content(path, format!("cannot write: {e}")),
-    };
-    let mut file = AtomicFile::create(path)?;
-    let mut encoder = png::Encoder::new(&mut file, image.size().width, image.size().height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header().map_err(failed)?;
-    writer.write_image_data(image.data().as_flattened()).map_err(failed)?;
-    writer.finish().map_err(failed)?;
-    file.commit()
+    write_picture(path, &draw(table, classes))
 }
 
 fn draw(table: &ClassTable, classes: &BTreeMap<ClassId, ClassPoints>) -> ColorImage {
     let lines = lines(table, classes);
     let longest = lines.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0);
-    let column = PATCH.0 + MARGIN + longest * get_raster_width(FontWeight::Regular, FONT);
+    let column = PATCH.0 + MARGIN + text_width(&"m".repeat(longest));
     let columns = lines.len().div_ceil(MOST_LINES).max(1);
     let rows = lines.len().div_ceil(columns).max(1);
     let width = MARGIN + columns * (column + MARGIN);
@@ -92,20 +78,6 @@ fn patch(image: &mut ColorImage, x: usize, y: usize, color: [u8; 3]) {
         for dx in 0..PATCH.0 {
             let is_frame = dx == 0 || dy == 0 || dx == PATCH.0 - 1 || dy == PATCH.1 - 1;
             image[(x + dx, y + dy)] = if is_frame { GREY } else { color };
-        }
-    }
-}
-
-/// `text` in black with its upper left corner at (`x`, `y`); a character that the font lacks is shown as `?`.
-fn put_text(image: &mut ColorImage, x: usize, y: usize, text: &str) {
-    let raster = |c| get_raster(c, FontWeight::Regular, FONT);
-    let width = get_raster_width(FontWeight::Regular, FONT);
-    for (i, raster) in text.chars().filter_map(|c| raster(c).or_else(|| raster('?'))).enumerate() {
-        let left = x + i * width;
-        for (dy, row) in raster.rows().enumerate() {
-            for (dx, ink) in row.iter().enumerate() {
-                image[(left + dx, y + dy)] = [255 - ink; 3];
-            }
         }
     }
 }

@@ -19,6 +19,7 @@ fn cloud(path: &Path) -> LabelledPoints {
     LabelledPoints {
         positions: cloud.positions.iter().map(|p| p.map(f64::from)).collect(),
         labels: (!cloud.labels.is_empty()).then_some(cloud.labels),
+        ..LabelledPoints::default()
     }
 }
 

@@ -97,10 +97,12 @@ fn scores(cloud: &PointCloud, truth: &Path, classes: &[u16]) -> CloudScores {
     let ours = LabelledPoints {
         positions: cloud.iter().map(|p| p.position.map(f64::from)).collect(),
         labels: Some(cloud.iter().map(|p| p.label).collect()),
+        ..LabelledPoints::default()
     };
     let truth = LabelledPoints {
         positions: truth.positions.iter().map(|p| p.map(f64::from)).collect(),
         labels: Some(truth.labels),
+        ..LabelledPoints::default()
     };
     let options = CloudScoreOptions {
         thresholds: vec![0.02, 0.05, 0.10],

@@ -2,7 +2,7 @@
 
 use crate::cli::semvs_args::EvaluateArgs;
 use crate::error::{Error, Result};
-use crate::evaluate::{CloudScoreOptions, CloudScores};
+use crate::evaluate::{CloudScoreOptions, CloudScores, ReliabilityBin};
 use crate::pipeline::{self, EvaluateJob};
 use std::fmt::Write;
 
@@ -19,6 +19,7 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<()> {
             cloud_classes: args.cloud_classes.clone(),
             per_class: args.per_class,
         },
+        reliability_diagram: args.reliability_diagram.clone(),
     })?;
     let text = match args.json {
         true => serde_json::to_string(&scores).map_err(|e| Error::invalid(format!("no JSON: {e}")))? + "\n",
@@ -58,6 +59,17 @@ fn text(scores: &CloudScores) -> String {
             let _ = write!(out, ", class {class} {}", number(*iou));
         }
         out.push('\n');
+        labels.reliability.iter().for_each(|bins| add_reliability(&mut out, bins));
     }
     out
+}
+
+/// The share of right labels by confidence.
+fn add_reliability(out: &mut String, bins: &[ReliabilityBin]) {
+    out.push_str("\nlabel_confidence  points     right\n");
+    for bin in bins {
+        let right = bin.right.map_or("-".to_owned(), |right| format!("{right:.4}"));
+        let _ =
+            writeln!(out, "{:.2} to {:.2}      {:>6.2} %  {right:>6}", bin.from, bin.to, 100.0 * bin.share);
+    }
 }
