@@ -38,6 +38,9 @@ pub enum Error {
     /// More memory is needed than there is.
     #[error("out of memory: {0}")]
     OutOfMemory(String),
+    /// The work was stopped by whoever asked for it.
+    #[error("interrupted; what is complete is kept, the same command goes on from there")]
+    Interrupted,
     /// The scene or the options cannot be used as given.
     #[error("{0}")]
     Invalid(String),

@@ -1,5 +1,6 @@
 //! What running work tells whoever started it. Nothing here prints, opens a file or reads a clock.
 
+use crate::error::{Error, Result};
 use crate::scene::ImageId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -159,6 +160,10 @@ pub trait Listener: Send + Sync {
     fn event(&self, event: &Event);
     /// `done` of `total` steps of `stage` are finished; 0 when it starts, `total` when it ends.
     fn steps(&self, stage: Stage, done: usize, total: usize);
+    /// Whether the work is to stop as soon as what is in hand is complete.
+    fn wants_stop(&self) -> bool {
+        false
+    }
 }
 
 /// Handle by which work reports; cheap to clone.
@@ -176,6 +181,14 @@ impl Progress {
     /// Reports to nobody.
     pub fn silent() -> Self {
         Progress { listener: Arc::new(Silent) }
+    }
+
+    /// Whether to go on.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if whoever listens wants the work to stop.
+    pub fn check(&self) -> Result<()> {
+        if self.listener.wants_stop() { Err(Error::Interrupted) } else { Ok(()) }
     }
 
     /// Passes `event` on.

@@ -65,7 +65,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("dbg!(", &[]),
     ("println!(", &[]),
     ("eprintln!(", &[]),
-    ("unsafe {", &["stereo"]),
+    ("unsafe {", &["stereo", "cli"]),
 ];
 
 /// Modules that never touch a file, the clock, the environment or the console.

@@ -1,23 +1,31 @@
 //! What the programs remember of what is said.
 
+use super::interrupt;
 use crate::progress::{Event, Listener, Progress, Stage};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Passes everything on to `inner` and remembers the warnings.
 pub(crate) struct Recorder {
     inner: Arc<dyn Listener>,
     warnings: Mutex<Vec<String>>,
+    stop: Arc<AtomicBool>,
 }
 
 impl Recorder {
     /// A recorder before `inner`.
     pub(crate) fn before(inner: Arc<dyn Listener>) -> Arc<Self> {
-        Arc::new(Recorder { inner, warnings: Mutex::default() })
+        Arc::new(Recorder { inner, warnings: Mutex::default(), stop: Arc::default() })
     }
 
     /// The handle for work that reports here.
     pub(crate) fn progress(self: &Arc<Self>) -> Progress {
         Progress::new(Arc::clone(self) as Arc<dyn Listener>)
+    }
+
+    /// From now on Ctrl-C asks the work to stop instead of ending the process; only for work that heeds it.
+    pub(crate) fn heed_interrupts(&self) {
+        interrupt::ask_to_stop(&self.stop);
     }
 
     /// The warnings so far, sorted: threads give them in any order.
@@ -43,6 +51,10 @@ impl Listener for Recorder {
     fn steps(&self, stage: Stage, done: usize, total: usize) {
         self.inner.steps(stage, done, total);
     }
+
+    fn wants_stop(&self) -> bool {
+        self.stop.load(Ordering::SeqCst)
+    }
 }
 
 #[cfg(test)]
@@ -58,7 +70,7 @@ mod tests {
 
     #[test]
     fn warnings_are_remembered_once_and_sorted() {
-        let recorder = Arc::new(Recorder { inner: Arc::new(Nobody), warnings: Mutex::default() });
+        let recorder = Recorder::before(Arc::new(Nobody));
         let progress = recorder.progress();
         progress.warn("b");
         progress.warn("a");

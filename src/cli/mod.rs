@@ -1,11 +1,13 @@
 //! The programs: what is typed, what it means, what is said meanwhile.
 
+mod allocator;
 mod commands;
 mod console;
 mod dense_config;
 mod densify_point_cloud;
 mod duration;
 mod exchange_args;
+mod interrupt;
 mod label_options;
 mod labels_args;
 mod listen;
@@ -16,15 +18,20 @@ mod semvs;
 mod semvs_args;
 mod values;
 
+pub use allocator::ExitWhenExhausted;
 pub use densify_point_cloud::densify_point_cloud;
 pub use semvs::semvs;
 
 use std::io::Write;
 
-/// The exit code of a failure: 137, which callers take for "out of memory" because the system kills with it, or 1.
+/// What callers take for "out of memory", because the system kills with it.
+const OUT_OF_MEMORY: u8 = 137;
+
+/// The exit code of a failure.
 fn exit_code(error: &crate::Error) -> std::process::ExitCode {
     match error {
-        crate::Error::OutOfMemory(_) => std::process::ExitCode::from(137),
+        crate::Error::OutOfMemory(_) => std::process::ExitCode::from(OUT_OF_MEMORY),
+        crate::Error::Interrupted => std::process::ExitCode::from(interrupt::INTERRUPTED),
         _ => std::process::ExitCode::FAILURE,
     }
 }

@@ -1,7 +1,7 @@
 //! The options that `semvs densify`, `semvs fuse` and `DensifyPointCloud` share, as typed.
 //! Names, meanings and defaults are those of OpenMVS 2.3.0.
 
-use super::values::boolean;
+use super::values::{boolean, bytes};
 use crate::stereo::Quality;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -17,9 +17,16 @@ pub(crate) struct RunOptions {
     /// Number of threads; 0 = all that the machine has. Results do not depend on it
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) max_threads: u32,
+    /// Most memory that may be used, 4G or 512M; fewer images are worked on at a time where it is short [default: 70 % of what the
+    /// machine, or the control group, has]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub(crate) max_memory: Option<u64>,
     /// Stop when an image or a depth map cannot be used, instead of going on without it
     #[arg(long)]
     pub(crate) strict: bool,
+    /// Make all depth maps anew, also those of an earlier run with the same input and options
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 /// Which images, at which size, with which neighbours.

@@ -65,6 +65,7 @@ impl<'a> Resolver<'a> {
             strict: self.options.run.strict,
             like_openmvs: false,
             max_threads: self.options.run.max_threads as usize,
+            max_memory: self.options.run.max_memory,
         })
     }
 

@@ -32,7 +32,7 @@ pub fn semvs(words: impl IntoIterator<Item = OsString>) -> ExitCode {
         Err(error) => {
             complain(&format!("error: {}\n", printable(&error.to_string())));
             match error {
-                crate::Error::OutOfMemory(_) => exit_code(&error),
+                crate::Error::OutOfMemory(_) | crate::Error::Interrupted => exit_code(&error),
                 _ => failure,
             }
         }

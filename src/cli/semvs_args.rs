@@ -143,6 +143,7 @@ const NOT_FOR_FUSE: &[&str] = &[
     "label_filter",
     "filter",
     "remove_dmaps",
+    "force",
 ];
 
 const FUSE_EXAMPLES: &str = "\

@@ -11,6 +11,24 @@ pub(crate) fn boolean(text: &str) -> Result<bool, String> {
     }
 }
 
+/// A number of bytes: 4G, 512M, 1.5GiB.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let refusal = || "expected a number and a unit, 4G or 512M".to_owned();
+    let text = text.trim().to_ascii_uppercase();
+    let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).ok_or_else(refusal)?;
+    let shift = match text[end..].trim_start().trim_end_matches('B').trim_end_matches('I') {
+        "K" => 10,
+        "M" => 20,
+        "G" => 30,
+        "T" => 40,
+        _ => return Err(refusal()),
+    };
+    let number: f64 = text[..end].parse().map_err(|_| refusal())?;
+    let bytes =
+        number * f64::from(1u32 << (shift % 30)) * if shift < 30 { 1.0 } else { f64::from(1u32 << 30) };
+    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(refusal()) }
+}
+
 /// Three finite numbers separated by commas.
 pub(crate) fn offset(text: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> =
@@ -60,6 +78,18 @@ mod tests {
         }
         assert!(boolean("2").is_err());
         assert!(boolean("").is_err());
+    }
+
+    #[test]
+    fn sizes_have_a_unit() {
+        for (text, value) in
+            [("4G", 4 << 30), ("512m", 512 << 20), ("1.5 GiB", 3 << 29), ("2TB", 2 << 40), ("64K", 65536)]
+        {
+            assert_eq!(bytes(text), Ok(value), "{text}");
+        }
+        for text in ["", "4", "G", "-4G", "4X", "1..5G", "0G", "nan", "9999999999T"] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -63,8 +63,8 @@ pub fn fuse(
     let stage = if options.number_views_fuse < 2 { Stage::Merge } else { Stage::Fuse };
     let done = progress.start(stage, plan.steps.len());
     let depths = match stage {
-        Stage::Merge => merge_plainly(input, &plan, options, &mut tally, &done, sink)?,
-        _ => fuse_by_turns(input, &plan, options, &mut tally, &done, sink)?,
+        Stage::Merge => merge_plainly(input, &plan, options, &mut tally, (progress, &done), sink)?,
+        _ => fuse_by_turns(input, &plan, options, &mut tally, (progress, &done), sink)?,
     };
     Ok(tally.into_summary(plan.steps.len(), depths))
 }
@@ -75,11 +75,12 @@ fn merge_plainly(
     plan: &FusionPlan,
     options: &FusionOptions,
     tally: &mut Tally,
-    done: &Steps,
+    (progress, done): (&Progress, &Steps),
     sink: &mut dyn PointSink,
 ) -> Result<u64> {
     let mut depths = 0;
     for step in &plan.steps {
+        progress.check()?;
         let maps = load_checked(input.views, plan, input.source, step.view)?;
         require_color(step.view, &maps.estimate.image_name, maps.color.is_some(), options)?;
         let labels = maps.labels.as_ref().map(|labels| labels.data());
@@ -96,7 +97,7 @@ fn fuse_by_turns(
     plan: &FusionPlan,
     options: &FusionOptions,
     tally: &mut Tally,
-    done: &Steps,
+    (progress, done): (&Progress, &Steps),
     sink: &mut dyn PointSink,
 ) -> Result<u64> {
     let min_views = (options.number_views_fuse as usize).min(input.views.len());
@@ -110,6 +111,7 @@ fn fuse_by_turns(
     let mut maps = WorkingSet::new(input, plan, options.map_memory);
     let mut depths = 0;
     for (i, step) in plan.steps.iter().enumerate() {
+        progress.check()?;
         maps.prepare(i)?;
         let views: Vec<ViewIndex> = step.views().collect();
         let reference = maps.maps(step.view)?;

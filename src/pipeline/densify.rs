@@ -1,16 +1,19 @@
 //! Everything from the scene to the dense cloud, in order.
 
 use super::diagnostics::{leave_pictures, leave_project};
-use super::estimate::{Estimation, existing_maps};
+use super::estimate::{Estimation, fitting_maps};
 use super::filter::filter_across_views;
 use super::fusing::{Fused, fuse_maps, possible};
+use super::ingredients::Recipe;
 use super::inputs::{Classes, check_inputs, named_files};
-use super::job::{DensifyJob, SceneJob};
+use super::job::DensifyJob;
+use super::memory_plan::MemoryPlan;
 use super::outputs::{
     check_depth_maps, check_places, check_report, class_rows, cloud_rows, placement, write_cloud, write_scene,
 };
-use super::prepare::{Prepared, load, name_unmatched, pixels_in_hand, prepare};
+use super::prepare::{Prepared, load, name_unmatched, prepare};
 use super::record::{Clock, view_rows, with_threads};
+use super::resume::{Plan, Reuse};
 use super::skip::Labels;
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions, WithNormals, WithSmoothLabels};
@@ -25,16 +28,11 @@ use crate::store::cloud::PlyLayout;
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::LoadedScene;
 use crate::store::stored_cloud::StoredCloud;
+use crate::store::work_folder::{FolderLock, sweep};
 use nalgebra::Vector3;
 use semvs_formats::Limits;
+use std::collections::BTreeSet;
 use std::path::Path;
-
-/// Least memory for depth maps between the passes.
-const MIN_MAP_MEMORY: usize = 176 << 20;
-/// Most memory for depth maps between the passes.
-const MAX_MAP_MEMORY: usize = 4 << 30;
-/// Bytes per pixel of a depth map in memory.
-const MAP_BYTES: usize = 20;
 
 /// Runs `job`: depth maps of all views into their folder, then the cloud and its companions. The report lacks what
 /// only the program knows: its name, its options, the warnings.
@@ -52,6 +50,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     check_report(&job.outputs, &named_files(&job.input))?;
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
     create_folder(&job.depth_maps)?;
+    let mut lock = enter_folder(job, progress)?;
     let loaded = load(&job.input, progress)?;
     let mut cameras = working_cameras(&loaded, &job.resolution, job.input.strict, progress)?;
     if job.only_fuses() {
@@ -59,61 +58,117 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     }
     check_depth_maps(&loaded, &cameras, &job.depth_maps)?;
     clock.stage("load");
-    let mut prepared = prepare(&job.input, &job.outputs, loaded, cameras, true, progress)?;
-    let store = store(&job.input, &prepared, &job.depth_maps);
+    let memory = MemoryPlan::of(&job.input, &cameras, !job.only_fuses())?;
+    let mut prepared = prepare(&job.input, &job.outputs, loaded, cameras, true, &memory, progress)?;
+    let search = prepared.loaded.search.clone();
+    let store = DepthStore::new(&job.depth_maps, search, memory.maps, Limits::default());
     clock.stage("prepare");
 
-    let use_existing = job.stereo.geometric_iterations == 0 || job.input.like_openmvs;
-    let existing = existing_maps(&prepared, &store, use_existing, job.input.strict, progress)?;
-    let maps = name_unmatched(&mut prepared, &existing, job.input.strict, progress)?;
+    let reuse = reuse(job);
+    let refuse = job.input.strict && matches!(reuse, Reuse::Fitting | Reuse::SameOrFitting);
+    let fitting = fitting_maps(&prepared, &store, refuse, progress)?;
+    let plan = {
+        let recipe = Recipe { prepared: &prepared, options: &job.stereo, filter: &job.filter };
+        Plan::make(recipe, &store, &fitting, reuse, progress)?
+    };
+    if lock.is_none() && plan.has_work() {
+        lock = Some(FolderLock::take(&job.depth_maps)?);
+    }
+    let maps = name_unmatched(&mut prepared, &plan.given, job.input.strict, progress)?;
     let fusion = match job.depth_maps_only {
         true => job.fusion,
         false => possible(&job.fusion, prepared.count(), maps, progress)?,
     };
-    progress.detail(format!("depth maps are estimated with the {} kernels", cpu.name()));
-    let estimation = Estimation {
-        prepared: &prepared,
-        store: &store,
-        options: &job.stereo,
-        filter: &job.filter,
-        cpu,
-        progress,
-    };
-    let mapped = estimation.run(&existing)?;
-    let pictures = |stage: &str| match job.pictures {
-        true => leave_pictures(&prepared, &store, &mapped, stage),
-        false => Ok(()),
-    };
-    pictures("")?;
-    clock.stage("estimate");
-    if let Some(across) = &job.filter.across {
-        filter_across_views(&prepared, &store, &mapped, across, &job.filter.options, progress)?;
-        pictures(".filtered")?;
-        clock.stage("filter");
-    }
+    let mapped = make_maps(job, &prepared, &store, &plan, &memory, cpu, &mut clock, progress)?;
     let mut report = RunReport {
         scene: job.input.scene.display().to_string(),
         cpu_level: Some(cpu.name().to_owned()),
         ..RunReport::default()
     };
     if job.depth_maps_only {
-        finish_depth_maps(job, &prepared, &mapped, &clock, progress, &mut report)?;
+        finish_depth_maps(job, &prepared, mapped, &clock, progress, &mut report)?;
     } else {
-        finish_cloud(job, &fusion, &prepared, &store, &mapped, &mut clock, progress, &mut report)?;
+        finish_cloud(job, &fusion, &prepared, &store, mapped, &memory, &mut clock, progress, &mut report)?;
     }
     if job.pictures {
         leave_project(&prepared, &job.outputs.cloud)?;
     }
-    report.views = view_rows(&prepared, &store, &mapped, &existing)?;
-    depth_map_rows(&prepared, &store, &mapped, &mut report);
+    report.views = view_rows(&prepared, &store, mapped, &plan.reused())?;
+    depth_map_rows(&prepared, &store, mapped, &mut report);
     // Whoever wants depth maps alone keeps them.
+    let mut gone = Vec::new();
     if job.remove_depth_maps && !job.depth_maps_only {
-        mapped.iter().try_for_each(|&view| store.delete(prepared.id(view)))?;
+        gone.extend(mapped.iter().map(|&view| prepared.id(view)));
+        gone.iter().try_for_each(|&id| store.delete(id))?;
         report.outputs.retain(|output| output.content != DEPTH_MAP);
+    }
+    if lock.is_some() {
+        plan.finish(&gone)?;
     }
     clock.stage("write");
     clock.finish(&mut report);
     Ok(report)
+}
+
+/// Clears what runs that were killed have left in the folders of a job, and takes that of the depth maps for it alone; a
+/// job that, as a rule, only reads them needs it only when it turns out to write some.
+fn enter_folder(job: &DensifyJob, progress: &Progress) -> Result<Option<FolderLock>> {
+    let lock = match job.only_fuses() {
+        true => FolderLock::check_free(&job.depth_maps).map(|()| None)?,
+        false => Some(FolderLock::take(&job.depth_maps)?),
+    };
+    let folders: BTreeSet<&Path> = [job.depth_maps.as_path(), job.outputs.folder()].into();
+    let swept: usize = folders.into_iter().map(sweep).sum();
+    if swept > 0 {
+        progress.info(format!("{swept} temporary files of a run that was killed are deleted"));
+    }
+    Ok(lock)
+}
+
+/// What the job does with depth maps that are there.
+fn reuse(job: &DensifyJob) -> Reuse {
+    match (job.input.like_openmvs, job.stereo.geometric_iterations) {
+        _ if job.force => Reuse::Nothing,
+        (true, _) => Reuse::Fitting,
+        // Pictures show all stages.
+        (false, 0) if job.pictures => Reuse::Fitting,
+        (false, 0) => Reuse::SameOrFitting,
+        (false, _) if job.pictures => Reuse::Nothing,
+        (false, _) => Reuse::Same,
+    }
+}
+
+/// Makes what `plan` lacks; returns the views that have a depth map then.
+#[allow(clippy::too_many_arguments, reason = "what a run has by then")]
+fn make_maps<'a>(
+    job: &DensifyJob,
+    prepared: &Prepared,
+    store: &DepthStore,
+    plan: &'a Plan,
+    memory: &MemoryPlan,
+    cpu: CpuLevel,
+    clock: &mut Clock,
+    progress: &Progress,
+) -> Result<&'a [ViewIndex]> {
+    progress.detail(format!("depth maps are estimated with the {} kernels", cpu.name()));
+    let DensifyJob { stereo: options, filter, .. } = job;
+    let passes = options.geometric_iterations;
+    let pictures = |after: u32, stage: &str| match job.pictures {
+        true => leave_pictures(prepared, store, plan, after, stage),
+        false => Ok(()),
+    };
+    let at_once = memory.views_at_once;
+    Estimation { prepared, store, plan, options, filter, at_once, cpu, progress }.run()?;
+    pictures(passes, "")?;
+    clock.stage("estimate");
+    if let Some(across) = &filter.across {
+        let stage = passes + 1;
+        filter_across_views(prepared, store, plan, (stage, at_once), across, &filter.options, progress)?;
+        pictures(stage, ".filtered")?;
+        clock.stage("filter");
+    }
+    plan.publish(store)?;
+    Ok(&plan.views)
 }
 
 /// Gives the views whose depth map is of another size than the options say, but of this scene, a camera of that size:
@@ -155,12 +210,6 @@ fn depth_map_rows(prepared: &Prepared, store: &DepthStore, mapped: &[ViewIndex],
     }));
 }
 
-/// The store of a job's depth maps, with memory for what the threads work on at a time.
-fn store(job: &SceneJob, prepared: &Prepared, folder: &Path) -> DepthStore {
-    let memory = (pixels_in_hand(job, &prepared.cameras) * MAP_BYTES).clamp(MIN_MAP_MEMORY, MAX_MAP_MEMORY);
-    DepthStore::new(folder, prepared.loaded.search.clone(), memory, Limits::default())
-}
-
 fn finish_depth_maps(
     job: &DensifyJob,
     prepared: &Prepared,
@@ -197,12 +246,13 @@ fn finish_cloud(
     prepared: &Prepared,
     store: &DepthStore,
     mapped: &[ViewIndex],
+    memory: &MemoryPlan,
     clock: &mut Clock,
     progress: &Progress,
     report: &mut RunReport,
 ) -> Result<()> {
     let folder = job.outputs.folder();
-    let fused = fuse_maps(prepared, store, mapped, fusion, &job.input.roi, folder, progress)?;
+    let fused = fuse_maps(prepared, store, mapped, fusion, &job.input.roi, folder, memory, progress)?;
     clock.stage("fuse");
     progress.event(Event::Densified { points: fused.cloud.len(), elapsed: clock.elapsed() });
     write_results(&job.outputs, prepared, &fused, fusion, progress, report)

@@ -3,15 +3,17 @@
 use super::estimate::for_each_view;
 use super::filter::valid_depths;
 use super::prepare::Prepared;
+use super::resume::Plan;
 use crate::error::Result;
 use crate::fusion::{FusionMaps, project_maps};
 use crate::geometry::Camera;
-use crate::scene::{CloudLayout, ViewIndex};
+use crate::progress::Progress;
+use crate::scene::CloudLayout;
 use crate::store::depth_store::DepthStore;
 use crate::store::diagnostics::{ViewCloud, write_meshlab, write_picture};
 use std::path::Path;
 
-/// Beside the depth map of every one of `views`: `depthNNNN<stage>.png`, its points as `depthNNNN<stage>.ply` and, for the
+/// Beside the depth map of every view, as it is after the stage `after`: `depthNNNN<stage>.png`, its points as `depthNNNN<stage>.ply` and, for the
 /// empty stage, its confidences as `depthNNNN.conf.png`.
 ///
 /// # Errors
@@ -19,12 +21,13 @@ use std::path::Path;
 pub(super) fn leave_pictures(
     prepared: &Prepared,
     store: &DepthStore,
-    views: &[ViewIndex],
+    plan: &Plan,
+    after: u32,
     stage: &str,
 ) -> Result<()> {
-    for_each_view(views, |view| {
+    for_each_view(&plan.views, 1, &Progress::silent(), |view| {
         let id = prepared.id(view);
-        let estimate = store.read(id)?;
+        let estimate = plan.read(store, view, after)?;
         let beside = |extension: &str| store.path(id).with_extension(extension);
         write_picture(&beside(&format!("{stage}.png")[1..]), &estimate.depth, true)?;
         if let Some(confidence) = estimate.confidence.as_ref().filter(|_| stage.is_empty()) {

@@ -3,12 +3,14 @@
 use super::job::FilterJob;
 use super::prepare::Prepared;
 use super::problem::stereo_problem;
+use super::record::with_threads;
+use super::resume::Plan;
 use crate::depth_filter::{fill_gaps, remove_speckles};
 use crate::error::{Error, Result};
 use crate::progress::{Event, Progress, Stage};
-use crate::scene::{DepthEstimate, ImageId, ViewIndex};
+use crate::scene::{DepthEstimate, ViewIndex};
 use crate::stereo::{self, CpuLevel, StereoOptions};
-use crate::store::depth_store::{DepthStore, Existing, Lasting};
+use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::memory;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -19,79 +21,56 @@ use std::time::Instant;
 pub(super) struct Estimation<'a> {
     pub(super) prepared: &'a Prepared,
     pub(super) store: &'a DepthStore,
+    pub(super) plan: &'a Plan,
     pub(super) options: &'a StereoOptions,
     pub(super) filter: &'a FilterJob,
+    /// Views that are worked on at a time.
+    pub(super) at_once: usize,
     pub(super) cpu: CpuLevel,
     pub(super) progress: &'a Progress,
 }
 
-/// Which views have a depth map in the folder that is used as it is.
-///
-/// Without geometric passes every map whose id, size and camera fit is; with them no map is, because nothing tells
-/// what it was made from. What is not used is said in a line.
+/// Which views have a depth map in the folder whose id, size and camera fit. What does not fit is said in a line.
 ///
 /// # Errors
-/// With `strict`, a map that was to be used and does not fit.
-pub(super) fn existing_maps(
+/// With `refuse`, a map that does not fit.
+pub(super) fn fitting_maps(
     prepared: &Prepared,
     store: &DepthStore,
-    use_existing: bool,
-    strict: bool,
+    refuse: bool,
     progress: &Progress,
 ) -> Result<BTreeSet<ViewIndex>> {
-    let mut used = BTreeSet::new();
-    let mut unused = 0usize;
+    let mut fitting = BTreeSet::new();
     for view in prepared.views() {
         match store.existing(prepared.id(view), prepared.camera(view)?) {
             Existing::Absent => {}
-            Existing::Usable if use_existing => drop(used.insert(view)),
-            Existing::Usable => unused += 1,
-            Existing::Unusable(why) if use_existing && strict => return Err(Error::Invalid(why)),
+            Existing::Usable => drop(fitting.insert(view)),
+            Existing::Unusable(why) if refuse => return Err(Error::Invalid(why)),
             Existing::Unusable(why) => progress.warn(format!("{why}; the depth map is estimated again")),
         }
     }
-    if unused > 0 {
-        progress.info(format!(
-            "{}: {unused} depth maps exist; what they were made from is not known, they are estimated again \
-             (--geometric-iters 0 uses them as they are)",
-            store.folder().display()
-        ));
-    }
-    if !used.is_empty() {
-        progress.info(format!(
-            "{}: {} depth maps are used as they are",
-            store.folder().display(),
-            used.len()
-        ));
-    }
-    Ok(used)
+    Ok(fitting)
 }
 
 impl Estimation<'_> {
-    /// Leaves the final depth map of every view in the store: estimated, refined, and cleaned of speckles and gaps.
-    /// `existing` maps are not estimated again: they are refined if there are geometric passes, else only cleaned. Returns the views that have a map.
+    /// Leaves the depth map of every view as the last geometric pass makes it, cleaned of speckles and gaps; maps that are
+    /// taken as they are are refined if there are geometric passes, else only cleaned.
     ///
     /// # Errors
     /// An image cannot be read, a depth map cannot be written.
-    pub(super) fn run(&self, existing: &BTreeSet<ViewIndex>) -> Result<Vec<ViewIndex>> {
-        let todo: Vec<ViewIndex> =
-            self.prepared.matched_views().into_iter().filter(|v| !existing.contains(v)).collect();
-        let passes = self.options.geometric_iterations as usize;
-        let last = passes == 0;
-        self.require_memory(&todo)?;
-        self.photometric(&todo, last)?;
-        let mut views: Vec<ViewIndex> = todo.into_iter().chain(existing.iter().copied()).collect();
-        views.sort_unstable();
-        if passes == 0 {
-            self.clean_existing(existing)?;
-            return Ok(views);
+    pub(super) fn run(&self) -> Result<()> {
+        let passes = self.options.geometric_iterations;
+        self.require_memory(self.plan.todo(0))?;
+        let (given, estimated): (Vec<ViewIndex>, Vec<ViewIndex>) =
+            self.plan.todo(0).iter().partition(|view| self.plan.given.contains(view));
+        self.photometric(&estimated, passes == 0)?;
+        self.clean_given(&given)?;
+        self.plan.complete(self.store, 0);
+        for pass in 1..=passes {
+            self.geometric(pass, pass == passes)?;
+            self.plan.complete(self.store, pass);
         }
-        let matched = |view: &ViewIndex| !self.prepared.neighbors[view.index()].matching().is_empty();
-        let refined: Vec<ViewIndex> = views.iter().copied().filter(matched).collect();
-        for pass in 0..passes {
-            self.geometric(&refined, pass, pass + 1 == passes)?;
-        }
-        Ok(views)
+        Ok(())
     }
 
     /// Asks whether there is memory for the views that are worked on at a time: their images and planes, and no more, so
@@ -110,14 +89,17 @@ impl Estimation<'_> {
     }
 
     fn photometric(&self, todo: &[ViewIndex], last: bool) -> Result<()> {
+        if todo.is_empty() {
+            return Ok(());
+        }
         let steps = self.progress.start(Stage::Estimate, todo.len());
-        for_each_view(todo, |view| {
+        for_each_view(todo, self.at_once, self.progress, |view| {
             let start = Instant::now();
             let problem = stereo_problem(self.prepared, view)?;
             let mut estimate = stereo::estimate(&problem, self.options, self.cpu)?;
             self.clean(&mut estimate, last);
             let (reference, size) = (estimate.image_id, estimate.depth.size());
-            self.store.write(estimate, self.lasting(last))?;
+            self.plan.write(self.store, view, 0, estimate)?;
             self.progress.event(Event::DepthEstimated {
                 reference,
                 sources: problem.sources.len(),
@@ -129,50 +111,39 @@ impl Estimation<'_> {
         })
     }
 
-    /// One geometric pass: every view reads the maps of the pass before.
-    fn geometric(&self, todo: &[ViewIndex], pass: usize, last: bool) -> Result<()> {
-        let passes = self.options.geometric_iterations as usize;
-        let ids: BTreeSet<ImageId> = todo.iter().map(|&v| self.prepared.id(v)).collect();
-        let steps = self.progress.start(Stage::Geometric { pass, passes }, todo.len());
-        replace_all(self.store, &ids, || {
-            for_each_view(todo, |view| {
-                let problem = stereo_problem(self.prepared, view)?;
-                let previous = self.store.read(problem.reference.id)?;
-                let sources = problem
-                    .sources
-                    .iter()
-                    .map(|source| ids.contains(&source.id).then(|| self.store.read(source.id)).transpose())
-                    .collect::<Result<Vec<Option<Arc<DepthEstimate>>>>>()?;
-                let mut estimate =
-                    stereo::refine_geometric(&problem, &previous, &sources, pass, self.options, self.cpu)?;
-                self.clean(&mut estimate, last);
-                self.store.write_pending(estimate, self.lasting(last))?;
-                steps.step();
-                Ok(())
-            })
-        })
-    }
-
-    fn clean_existing(&self, existing: &BTreeSet<ViewIndex>) -> Result<()> {
-        if !(self.filter.speckles || self.filter.gaps) {
+    /// The geometric pass that is stage `stage`: every view reads the maps of the stage before.
+    fn geometric(&self, stage: u32, last: bool) -> Result<()> {
+        let todo = self.plan.todo(stage);
+        if todo.is_empty() {
             return Ok(());
         }
-        let views: Vec<ViewIndex> = existing.iter().copied().collect();
-        for_each_view(&views, |view| {
-            let before = self.store.read(self.prepared.id(view))?;
-            let mut estimate = DepthEstimate::clone(&before);
-            estimate.image_name.clone_from(&self.prepared.loaded.scene.views[view.index()].name);
-            self.clean(&mut estimate, true);
-            if estimate.depth != before.depth {
-                self.store.write(estimate, self.lasting(true))?;
-            }
+        let (pass, passes) = (stage as usize - 1, self.options.geometric_iterations as usize);
+        let steps = self.progress.start(Stage::Geometric { pass, passes }, todo.len());
+        for_each_view(todo, self.at_once, self.progress, |view| {
+            let problem = stereo_problem(self.prepared, view)?;
+            let before = |view| self.plan.read(self.store, view, stage - 1);
+            let previous = before(view)?;
+            let refined = |view| self.plan.is_refined(self.prepared, view);
+            let sources = self.prepared.neighbors[view.index()].matching().iter();
+            let sources = sources
+                .map(|source| refined(source.view).then(|| before(source.view)).transpose())
+                .collect::<Result<Vec<Option<Arc<DepthEstimate>>>>>()?;
+            let mut estimate =
+                stereo::refine_geometric(&problem, &previous, &sources, pass, self.options, self.cpu)?;
+            self.clean(&mut estimate, last);
+            self.plan.write(self.store, view, stage, estimate)?;
+            steps.step();
             Ok(())
         })
     }
 
-    /// What the maps of a pass are: results after the `last` one, unless the filter across views follows.
-    fn lasting(&self, last: bool) -> Lasting {
-        if last && self.filter.across.is_none() { Lasting::Result } else { Lasting::Passing }
+    fn clean_given(&self, views: &[ViewIndex]) -> Result<()> {
+        for_each_view(views, self.at_once, self.progress, |view| {
+            let mut estimate = DepthEstimate::clone(&*self.store.read(self.prepared.id(view))?);
+            estimate.image_name.clone_from(&self.prepared.loaded.scene.views[view.index()].name);
+            self.clean(&mut estimate, true);
+            self.plan.write(self.store, view, 0, estimate)
+        })
     }
 
     fn clean(&self, estimate: &mut DepthEstimate, last: bool) {
@@ -185,24 +156,19 @@ impl Estimation<'_> {
     }
 }
 
-/// Works on every view, as many at a time as the pool has threads.
+/// Works on every view, `at_once` at a time or as many as the pool has threads; stops before the next one when that is
+/// wanted.
 pub(super) fn for_each_view(
     views: &[ViewIndex],
+    at_once: usize,
+    progress: &Progress,
     work: impl Fn(ViewIndex) -> Result<()> + Sync + Send,
 ) -> Result<()> {
-    views.par_iter().with_max_len(1).try_for_each(|&view| work(view))
-}
-
-/// Lets `write_pending` write a pending map of every one of `ids`, then puts them in place; when it fails, the maps
-/// stay what they were.
-pub(super) fn replace_all(
-    store: &DepthStore,
-    ids: &BTreeSet<ImageId>,
-    write_pending: impl FnOnce() -> Result<()>,
-) -> Result<()> {
-    if let Err(error) = write_pending() {
-        ids.iter().for_each(|&id| store.discard_pending(id));
-        return Err(error);
-    }
-    ids.iter().try_for_each(|&id| store.publish(id))
+    let all = || {
+        views.par_iter().with_max_len(1).try_for_each(|&view| {
+            progress.check()?;
+            work(view)
+        })
+    };
+    if at_once < rayon::current_num_threads() { with_threads(at_once, all) } else { all() }
 }

@@ -1,48 +1,57 @@
 //! The filter across views: every depth is held against the maps of the neighbours.
 
-use super::estimate::{for_each_view, replace_all};
+use super::estimate::for_each_view;
 use super::job::AcrossViews;
 use super::prepare::Prepared;
+use super::resume::Plan;
 use crate::depth_filter::{
     DepthFilterOptions, FilterView, MAX_NEIGHBORS, filter_consistency, filter_unbiased,
 };
 use crate::error::Result;
 use crate::progress::{Event, Progress, Stage};
-use crate::scene::{DepthEstimate, DepthMap, ImageId, LabelMap, ViewIndex};
-use crate::store::depth_store::{DepthStore, Lasting};
-use std::collections::BTreeSet;
+use crate::scene::{DepthEstimate, DepthMap, LabelMap, ViewIndex};
+use crate::store::depth_store::DepthStore;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Replaces the maps of `views` by filtered ones; all read the maps as they were.
+/// The neighbours whose maps those of `view` are held against, best first; `views` are all that have maps.
+pub(super) fn neighbors_of_filter(
+    prepared: &Prepared,
+    view: ViewIndex,
+    across: &AcrossViews,
+    views: &[ViewIndex],
+) -> Vec<ViewIndex> {
+    let most = match across {
+        AcrossViews::OpenMvs => MAX_NEIGHBORS,
+        AcrossViews::Unbiased(options) => options.max_neighbors as usize,
+    };
+    let retained = prepared.neighbors[view.index()].retained.iter().map(|n| n.view);
+    retained.filter(|n| views.binary_search(n).is_ok()).take(most).collect()
+}
+
+/// The last stage of `plan`: filters the maps that the one before has left.
 ///
 /// # Errors
 /// A map cannot be read or written.
 pub(super) fn filter_across_views(
     prepared: &Prepared,
     store: &DepthStore,
-    views: &[ViewIndex],
+    plan: &Plan,
+    (stage, at_once): (u32, usize),
     across: &AcrossViews,
     options: &DepthFilterOptions,
     progress: &Progress,
 ) -> Result<()> {
-    let most = match across {
-        AcrossViews::OpenMvs => MAX_NEIGHBORS,
-        AcrossViews::Unbiased(options) => options.max_neighbors as usize,
-    };
-    let ids: BTreeSet<ImageId> = views.iter().map(|&v| prepared.id(v)).collect();
-    let steps = progress.start(Stage::Filter, views.len());
-    replace_all(store, &ids, || {
-        for_each_view(views, |view| {
+    let todo = plan.todo(stage);
+    if !todo.is_empty() {
+        let steps = progress.start(Stage::Filter, todo.len());
+        for_each_view(todo, at_once, progress, |view| {
             let start = Instant::now();
-            let reference = store.read(prepared.id(view))?;
-            let neighbors = prepared.neighbors[view.index()]
-                .retained
-                .iter()
-                .map(|n| n.view)
-                .filter(|&n| ids.contains(&prepared.id(n)))
-                .take(most)
-                .map(|n| Ok((n, store.read(prepared.id(n))?)))
+            let before = |view| plan.read(store, view, stage - 1);
+            let reference = before(view)?;
+            let neighbors = neighbors_of_filter(prepared, view, across, &plan.views)
+                .into_iter()
+                .map(|n| Ok((n, before(n)?)))
                 .collect::<Result<Vec<(ViewIndex, Arc<DepthEstimate>)>>>()?;
             let views: Vec<ViewIndex> = std::iter::once(view).chain(neighbors.iter().map(|n| n.0)).collect();
             let labels = labels_of(prepared, &views, &reference)?;
@@ -57,7 +66,7 @@ pub(super) fn filter_across_views(
             };
             filtered.image_name.clone_from(&prepared.loaded.scene.views[view.index()].name);
             let (before, after) = (valid_depths(&reference.depth), valid_depths(&filtered.depth));
-            store.write_pending(filtered, Lasting::Result)?;
+            plan.write(store, view, stage, filtered)?;
             progress.event(Event::DepthFiltered {
                 reference: prepared.id(view),
                 sources: against.len(),
@@ -67,8 +76,10 @@ pub(super) fn filter_across_views(
             });
             steps.step();
             Ok(())
-        })
-    })
+        })?;
+    }
+    plan.complete(store, stage);
+    Ok(())
 }
 
 /// The labels of `views` where the filter heeds them, borders void as the check wants them; else none.

@@ -4,6 +4,7 @@ use super::densify::write_results;
 use super::fusing::{fuse_maps, possible};
 use super::inputs::{Classes, check_inputs, named_files};
 use super::job::{DepthMapsJob, FuseJob};
+use super::memory_plan::MemoryPlan;
 use super::outputs::{check_places, check_report};
 use super::prepare::{load, prepare};
 use super::record::{Clock, view_rows, with_threads};
@@ -17,6 +18,7 @@ use crate::store::cameras::{camera_of_map, cameras_at_image_size, working_camera
 use crate::store::colmap::{ColmapMaps, Pass};
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::LoadedScene;
+use crate::store::work_folder::{FolderLock, sweep};
 use semvs_formats::Limits;
 use std::collections::BTreeSet;
 
@@ -36,6 +38,10 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     {
         return Err(Error::content(folder, "no such folder of depth maps (--depth-maps)"));
     }
+    if let DepthMapsJob::Folder(folder) = &job.depth_maps {
+        FolderLock::check_free(folder)?;
+    }
+    sweep(job.outputs.folder());
     let classes = check_inputs(&job.input)?;
     check_report(&job.outputs, &named_files(&job.input))?;
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
@@ -48,7 +54,8 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let mapped = maps_of_the_scene(&loaded, &cameras, &store, job.input.strict, progress)?;
     clock.stage("load");
     let decode = job.fusion.estimate_colors != AttributeSource::None;
-    let prepared = prepare(&job.input, &job.outputs, loaded, cameras, decode, progress)?;
+    let memory = MemoryPlan::of(&job.input, &cameras, false)?;
+    let prepared = prepare(&job.input, &job.outputs, loaded, cameras, decode, &memory, progress)?;
     let mapped: Vec<ViewIndex> =
         mapped.into_iter().filter(|v| prepared.cameras[v.index()].is_some()).collect();
     let fusion = possible(&job.fusion, prepared.count(), mapped.len(), progress)?;
@@ -56,7 +63,7 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
 
     let mut report = RunReport { scene: job.input.scene.display().to_string(), ..RunReport::default() };
     let folder = job.outputs.folder();
-    let fused = fuse_maps(&prepared, &store, &mapped, &fusion, &job.input.roi, folder, progress)?;
+    let fused = fuse_maps(&prepared, &store, &mapped, &fusion, &job.input.roi, folder, &memory, progress)?;
     clock.stage("fuse");
     progress.event(Event::Densified { points: fused.cloud.len(), elapsed: clock.elapsed() });
     write_results(&job.outputs, &prepared, &fused, &fusion, progress, &mut report)?;

@@ -2,6 +2,7 @@
 
 use super::job::RoiJob;
 use super::label_votes::LabelVotes;
+use super::memory_plan::MemoryPlan;
 use super::prepare::Prepared;
 use crate::depth_filter::normals_from_depth;
 use crate::error::{Error, Result};
@@ -14,7 +15,7 @@ use crate::progress::{Event, Progress};
 use crate::scene::{DepthEstimate, PointSource, ViewIndex};
 use crate::semantics::{Consensus, Voters};
 use crate::store::depth_store::DepthStore;
-use crate::store::spool::{DEFAULT_SPOOL_MEMORY, PointSpool, SpooledCloud};
+use crate::store::spool::{PointSpool, SpooledCloud};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -63,6 +64,7 @@ pub(super) fn possible(
 ///
 /// # Errors
 /// A map or an image cannot be read; the folder cannot be written.
+#[allow(clippy::too_many_arguments, reason = "all that fusion depends on")]
 pub(super) fn fuse_maps(
     prepared: &Prepared,
     store: &DepthStore,
@@ -70,9 +72,11 @@ pub(super) fn fuse_maps(
     options: &FusionOptions,
     roi: &RoiJob,
     folder: &Path,
+    memory: &MemoryPlan,
     progress: &Progress,
 ) -> Result<Fused> {
     let start = Instant::now();
+    let options = &FusionOptions { map_memory: memory.fusion, ..*options };
     let derive_normals = options.estimate_normals == AttributeSource::DuringFusion;
     let voting = prepared.labels.as_ref().filter(|labels| labels.rules().voters == Voters::All);
     let votes = voting.map(|labels| LabelVotes::new(prepared, labels, store, views));
@@ -88,7 +92,7 @@ pub(super) fn fuse_maps(
     let input = FusionInput { views: &fusion_views, source: &maps, policy };
     let region = prepared.loaded.scene.roi.as_ref().filter(|_| roi.crop);
     let crop = region.map(|region| region.with_border(roi.border)).transpose()?;
-    let mut spool = PointSpool::new(input.layout(options), crop, folder, DEFAULT_SPOOL_MEMORY);
+    let mut spool = PointSpool::new(input.layout(options), crop, folder, memory.points);
     let summary = fuse(&input, options, progress, &mut spool)?;
     let cloud = spool.finish()?;
     progress.event(Event::Fused {

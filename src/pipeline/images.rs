@@ -1,5 +1,6 @@
 //! The photographs at working size, decoded when they are needed and kept within a budget.
 
+use super::memory_plan::MemoryPlan;
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Size};
 use crate::progress::{Progress, Stage};
@@ -11,13 +12,6 @@ use rayon::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Bytes of colours that are kept.
-const COLOR_CACHE: usize = 64 << 20;
-/// Least bytes of luma that are kept.
-const MIN_GRAY_CACHE: usize = 64 << 20;
-/// Most bytes of luma that are kept.
-const MAX_GRAY_CACHE: usize = 4 << 30;
-
 /// The photographs of a scene's views.
 #[derive(Debug)]
 pub(super) struct Images {
@@ -27,14 +21,13 @@ pub(super) struct Images {
 }
 
 impl Images {
-    /// The photographs of all views; nothing is read yet. Of those of `in_hand` bytes of luma, which the threads need
-    /// at a time, as many are kept as is reasonable.
-    pub(super) fn new(loaded: &LoadedScene, in_hand: usize) -> Self {
+    /// The photographs of all views; nothing is read yet.
+    pub(super) fn new(loaded: &LoadedScene, memory: &MemoryPlan) -> Self {
         let views = 0..loaded.scene.views.len();
         Images {
             paths: views.map(|i| loaded.image_path(ViewIndex(i as u32))).collect(),
-            grays: ByteCache::new(in_hand.clamp(MIN_GRAY_CACHE, MAX_GRAY_CACHE)),
-            colors: ByteCache::new(COLOR_CACHE),
+            grays: ByteCache::new(memory.grays),
+            colors: ByteCache::new(memory.colors),
         }
     }
 
@@ -94,6 +87,7 @@ impl Images {
             .into_par_iter()
             .with_max_len(1)
             .map(|(view, size)| {
+                progress.check().ok()?;
                 let failed = self.gray(view, size).err().map(|error| (view, error));
                 steps.step();
                 failed

@@ -11,7 +11,7 @@ use crate::store::archive::{move_sizes, same_place, write_archive};
 use crate::store::atomic::AtomicFile;
 use crate::store::cameras::{camera_of_map, cameras_at_image_size};
 use crate::store::colmap::{ColmapMaps, Pass, Workspace};
-use crate::store::depth_store::{DepthStore, Lasting};
+use crate::store::depth_store::DepthStore;
 use crate::store::import::{LoadedScene, load_scene};
 use crate::store::rasters::{RasterFormat, read_depth};
 use rayon::prelude::*;
@@ -105,7 +105,7 @@ pub fn import_scene(job: &ImportSceneJob, progress: &Progress) -> Result<RunRepo
             }
             let mut estimate = maps.read(view.id)?;
             estimate.source_ids.clone_from(sources);
-            store.write(estimate, Lasting::Result)?;
+            store.write(estimate)?;
             Ok(Some(row(&store.path(view.id), super::DEPTH_MAP, None)))
         });
         outputs.extend(written.collect::<Result<Vec<_>>>()?.into_iter().flatten());
@@ -149,7 +149,7 @@ pub fn import_depths(job: &ImportDepthsJob, progress: &Progress) -> Result<RunRe
         }
         let depth = read_depth(path, job.depth_scale, &limits)?;
         let estimate = estimate_of(&loaded, *view, full, depth, path, job.normals)?;
-        store.write(DepthEstimate { source_ids: sources[at].clone(), ..estimate }, Lasting::Result)?;
+        store.write(DepthEstimate { source_ids: sources[at].clone(), ..estimate })?;
         Ok(Some(row(&store.path(loaded.scene.views[at].id), super::DEPTH_MAP, None)))
     });
     let outputs = written.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect();

@@ -40,6 +40,8 @@ pub struct SceneJob {
     pub like_openmvs: bool,
     /// Threads; 0 = all of the machine.
     pub max_threads: usize,
+    /// Bytes of memory that may be used; `None`: 70 % of what there is.
+    pub max_memory: Option<u64>,
 }
 
 /// What part of the scene is wanted.
@@ -106,6 +108,8 @@ pub struct DensifyJob {
     pub resolution: ResolutionOptions,
     /// Folder of the depth maps.
     pub depth_maps: PathBuf,
+    /// Make all depth maps anew, whatever is there.
+    pub force: bool,
     /// Leave pictures and a cloud of every depth map beside it, and a MeshLab project beside the cloud.
     pub pictures: bool,
     /// Estimation.

@@ -3,6 +3,7 @@
 use super::images::Images;
 use super::job::{Outputs, SceneJob};
 use super::masks::Masks;
+use super::memory_plan::MemoryPlan;
 use super::outputs::check_places;
 use super::skip::Labels;
 use super::sparse::{override_from_file, replace_points};
@@ -136,6 +137,7 @@ pub(super) fn prepare(
     loaded: LoadedScene,
     mut cameras: Vec<Option<Camera>>,
     decode: bool,
+    memory: &MemoryPlan,
     progress: &Progress,
 ) -> Result<Prepared> {
     let start = Instant::now();
@@ -145,7 +147,7 @@ pub(super) fn prepare(
     let masks = masks.map(|m| Masks::find(m, &loaded, &cameras, labels.as_ref(), progress)).transpose()?;
     // The classes of the table `ids` are known only now.
     check_places(outputs, labels.as_ref().map(Labels::classes))?;
-    let images = Images::new(&loaded, pixels_in_hand(job, &cameras) * size_of::<f32>());
+    let images = Images::new(&loaded, memory);
     let mut dropped = header_drops(&loaded, &cameras);
     if decode {
         for (view, error) in images.check(&cameras, progress) {
@@ -157,6 +159,7 @@ pub(super) fn prepare(
             dropped[view.index()] = Some(error.to_string());
         }
     }
+    progress.check()?;
     let usable = cameras.iter().flatten().count();
     if usable < 2 {
         let what = format!(

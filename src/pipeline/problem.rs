@@ -61,7 +61,11 @@ fn usable_scale(scale: f32) -> bool {
 
 /// The sparse points that start the depths of `view`, and the range of depths to search: that of these points,
 /// else that of all points that project into the image.
-fn sparse_points(prepared: &Prepared, view: ViewIndex, camera: &Camera) -> (Vec<SparsePoint>, (f32, f32)) {
+pub(super) fn sparse_points(
+    prepared: &Prepared,
+    view: ViewIndex,
+    camera: &Camera,
+) -> (Vec<SparsePoint>, (f32, f32)) {
     let tracks = &prepared.loaded.scene.tracks;
     let start = SparseInit::new(tracks, &prepared.neighbors[view.index()].tracks, camera);
     if start.points.is_empty() {

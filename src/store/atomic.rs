@@ -1,5 +1,6 @@
 //! Outputs that appear whole or not at all.
 
+use super::faults::{self, Access};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
@@ -7,6 +8,8 @@ use std::path::{Path, PathBuf};
 
 /// Bytes gathered before they go to the file.
 const BUFFER: usize = 1 << 20;
+/// How names of temporary files end.
+pub(crate) const TEMPORARY: &str = ".semvs-tmp";
 
 /// A file that is written under a temporary name in its folder and takes its name when it is complete.
 ///
@@ -14,7 +17,7 @@ const BUFFER: usize = 1 << 20;
 /// is neither file nor folder (a pipe, `/dev/stdout`) is written directly.
 #[derive(Debug)]
 pub(crate) struct AtomicFile {
-    writer: BufWriter<File>,
+    writer: BufWriter<Medium>,
     temporary: Option<tempfile::TempPath>,
     path: PathBuf,
 }
@@ -31,7 +34,7 @@ impl AtomicFile {
             }
             if !metadata.is_file() {
                 let file = File::options().write(true).open(path).map_err(|e| Error::io(path, "write", e))?;
-                let writer = BufWriter::with_capacity(BUFFER, file);
+                let writer = BufWriter::with_capacity(BUFFER, Medium { file, path: path.to_owned() });
                 return Ok(AtomicFile { writer, temporary: None, path: path.to_owned() });
             }
         }
@@ -40,22 +43,72 @@ impl AtomicFile {
         let named =
             temporary_beside(path, folder).map_err(|e| Error::io(path, "write (its folder refuses)", e))?;
         let (file, temporary) = named.into_parts();
-        let writer = BufWriter::with_capacity(BUFFER, file);
+        // Tells those who sweep that it is in use; where there are no locks nobody sweeps.
+        let _ = file.try_lock();
+        let writer = BufWriter::with_capacity(BUFFER, Medium { file, path: path.to_owned() });
         Ok(AtomicFile { writer, temporary: Some(temporary), path: path.to_owned() })
     }
 
-    /// Completes the file: flushes it and gives it its name, replacing what had it.
+    /// Completes the file: brings it to the medium and gives it its name, replacing what had it.
     ///
     /// # Errors
     /// [`Error::Io`] if the medium fails; then nothing has changed.
     pub(crate) fn commit(self) -> Result<()> {
+        self.complete(true)
+    }
+
+    /// The same for a file that can be made again: after a power failure it may be damaged under its name.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::commit`].
+    pub(crate) fn commit_passing(self) -> Result<()> {
+        self.complete(false)
+    }
+
+    fn complete(self, lasting: bool) -> Result<()> {
         let AtomicFile { mut writer, temporary, path } = self;
         writer.flush().map_err(|e| Error::io(&path, "write", e))?;
-        drop(writer);
-        match temporary {
-            Some(temporary) => temporary.persist(&path).map_err(|e| Error::io(&path, "replace", e.error)),
-            None => Ok(()),
+        let Some(temporary) = temporary else { return Ok(()) };
+        if lasting {
+            writer.get_ref().sync().map_err(|e| Error::io(&path, "write", e))?;
         }
+        drop(writer);
+        faults::meet(Access::Rename, &path).map_err(|e| Error::io(&path, "replace", e))?;
+        temporary.persist(&path).map_err(|e| Error::io(&path, "replace", e.error))?;
+        if lasting {
+            sync_folder(folder_of(&path));
+        }
+        Ok(())
+    }
+}
+
+/// The file itself.
+#[derive(Debug)]
+struct Medium {
+    file: File,
+    path: PathBuf,
+}
+
+impl Medium {
+    fn sync(&self) -> std::io::Result<()> {
+        faults::meet(Access::Sync, &self.path)?;
+        self.file.sync_all()
+    }
+}
+
+impl Write for Medium {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let length = faults::meet_write(&self.path, bytes.len())?;
+        self.file.write(&bytes[..length])
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for Medium {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.file.seek(to)
     }
 }
 
@@ -110,6 +163,17 @@ pub(crate) fn create_folder(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create folder", e))
 }
 
+/// Brings the names in `folder` to the medium, where the system can.
+pub(crate) fn sync_folder(folder: &Path) {
+    #[cfg(unix)]
+    if let Ok(folder) = File::open(folder) {
+        // The file itself is safe; a file system that cannot do this has its own ways.
+        let _ = folder.sync_all();
+    }
+    #[cfg(not(unix))]
+    let _ = folder;
+}
+
 /// The folder that holds `path`.
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
@@ -124,7 +188,7 @@ fn temporary_beside(path: &Path, folder: &Path) -> std::io::Result<tempfile::Nam
     prefix.push(path.file_name().unwrap_or_default());
     prefix.push(".");
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".tmp");
+    builder.prefix(&prefix).suffix(TEMPORARY);
     #[cfg(unix)]
     let plain = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     #[cfg(unix)]

@@ -77,6 +77,11 @@ impl<K: Hash + Eq + Copy, V> ByteCache<K, V> {
         }
     }
 
+    /// Keeps the value of `key` no longer; returns it.
+    pub(crate) fn remove(&self, key: K) -> Option<Arc<V>> {
+        self.lock().remove(&key)
+    }
+
     /// A thread that panicked while it held the lock left consistent counters: every change above is completed
     /// before anything that could panic.
     fn lock(&self) -> MutexGuard<'_, State<K, V>> {
@@ -85,10 +90,10 @@ impl<K: Hash + Eq + Copy, V> ByteCache<K, V> {
 }
 
 impl<K: Hash + Eq, V> State<K, V> {
-    fn remove(&mut self, key: &K) {
-        if let Some(entry) = self.entries.remove(key) {
-            self.bytes -= entry.bytes;
-        }
+    fn remove(&mut self, key: &K) -> Option<Arc<V>> {
+        let entry = self.entries.remove(key)?;
+        self.bytes -= entry.bytes;
+        Some(entry.value)
     }
 }
 

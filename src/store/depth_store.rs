@@ -1,19 +1,23 @@
 //! The depth maps of a scene, one `.dmap` file per view, as many as fit in memory too.
 
-use super::atomic::AtomicFile;
+use super::atomic::{AtomicFile, sync_folder};
+use super::byte_cache::ByteCache;
 use super::colmap::{ColmapMapHeader, ColmapMaps};
 use super::depth_map::{estimate_from_file, file_from_estimate, make_readable};
-use super::held_maps::{HeldMaps, Slot};
+use super::digest::{Digest, DigestingWriter};
+use super::faults::{self, Access};
+use super::map_fit::difference;
 use super::map_summary::{MapSummary, Summaries};
 use super::paths::{SearchPath, name_relative_to};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::scene::{DepthEstimate, ImageId};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
+use semvs_formats::Limits;
 use semvs_formats::dmap::{DepthMapFile, DepthMapHeader, read_header};
-use semvs_formats::{Limits, mvs::NO_ID};
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// File name of the depth map of an image: at least four digits, more are kept.
 pub fn depth_map_name(id: ImageId) -> String {
@@ -31,13 +35,13 @@ pub enum Existing {
     Unusable(String),
 }
 
-/// Whether a depth map is a result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lasting {
-    /// It is, and has a file.
-    Result,
-    /// Another one will take its place before the run ends: it gets a file only if it does not fit in memory.
-    Passing,
+/// Which of the maps of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MapStage {
+    /// The result, `depthNNNN.dmap`.
+    Final,
+    /// What a stage of an unfinished run has made, `depthNNNN.passK.dmap`.
+    Pass(u32),
 }
 
 /// The depth maps in one folder. May be used by many threads at once.
@@ -46,7 +50,10 @@ pub struct DepthStore {
     folder: PathBuf,
     images: SearchPath,
     limits: Limits,
-    held: HeldMaps,
+    /// Maps that were read or written lately.
+    held: ByteCache<(ImageId, MapStage), DepthEstimate>,
+    /// What files must hold that others rely on.
+    expected: Mutex<HashMap<(ImageId, MapStage), Digest>>,
     summaries: Summaries,
     /// The maps of a COLMAP workspace instead of those in `folder`; they are only read.
     colmap: Option<ColmapMaps>,
@@ -56,8 +63,9 @@ impl DepthStore {
     /// The depth maps in `folder`, of which up to `memory` bytes are held in memory. `images` says what the image
     /// names of estimates mean, so that files can name them relative to `folder`.
     pub fn new(folder: &Path, images: SearchPath, memory: usize, limits: Limits) -> Self {
-        let (held, summaries) = (HeldMaps::new(memory), Summaries::default());
-        DepthStore { folder: folder.to_owned(), images, limits, held, summaries, colmap: None }
+        let (held, summaries) = (ByteCache::new(memory), Summaries::default());
+        let (folder, expected) = (folder.to_owned(), Mutex::default());
+        DepthStore { folder, images, limits, held, expected, summaries, colmap: None }
     }
 
     /// The maps of a COLMAP workspace. Nothing can be written; nothing is kept in memory.
@@ -90,9 +98,12 @@ impl DepthStore {
         self.colmap.is_some()
     }
 
-    /// The file that [`DepthStore::write_pending`] writes.
-    fn pending_path(&self, id: ImageId) -> PathBuf {
-        self.folder.join(format!("depth{id}.geo.dmap"))
+    /// The file of a view's map of `stage`, be it there or not.
+    pub fn stage_path(&self, id: ImageId, stage: MapStage) -> PathBuf {
+        match stage {
+            MapStage::Final => self.path(id),
+            MapStage::Pass(pass) => self.folder.join(format!("depth{id}.pass{pass}.dmap")),
+        }
     }
 
     /// Whether the folder holds a usable map of the view with this global ID and camera (at the size of the maps).
@@ -129,22 +140,30 @@ impl DepthStore {
     /// # Errors
     /// The file is missing or damaged, or is the map of another image.
     pub fn read(&self, id: ImageId) -> Result<Arc<DepthEstimate>> {
-        if let Some(held) = self.held.get(id) {
-            return Ok(held);
-        }
-        let estimate = Arc::new(self.read_file(id)?);
-        self.held.hold_read(&estimate);
-        Ok(estimate)
+        self.read_stage(id, MapStage::Final)
     }
 
-    /// The depth map of a view for whoever needs it last: if there is a file, memory holds it no longer.
+    /// The depth map of a view that `stage` has left, from memory if it is there.
+    ///
+    /// # Errors
+    /// As [`DepthStore::read`]; the bytes of the file are others than [`DepthStore::expect`] said.
+    pub fn read_stage(&self, id: ImageId, stage: MapStage) -> Result<Arc<DepthEstimate>> {
+        let load = || {
+            let estimate = self.read_file(id, stage)?;
+            let bytes = bytes_of(&estimate);
+            Ok((estimate, bytes))
+        };
+        self.held.get_or_load((id, stage), load)
+    }
+
+    /// The depth map of a view for whoever needs it last: memory holds it no longer.
     ///
     /// # Errors
     /// As [`DepthStore::read`].
     pub fn take(&self, id: ImageId) -> Result<Arc<DepthEstimate>> {
-        match self.held.take(id) {
+        match self.held.remove((id, MapStage::Final)) {
             Some(held) => Ok(held),
-            None => Ok(Arc::new(self.read_file(id)?)),
+            None => Ok(Arc::new(self.read_file(id, MapStage::Final)?)),
         }
     }
 
@@ -159,8 +178,16 @@ impl DepthStore {
         }
     }
 
-    fn read_file(&self, id: ImageId) -> Result<DepthEstimate> {
-        let path = self.path(id);
+    fn read_file(&self, id: ImageId, stage: MapStage) -> Result<DepthEstimate> {
+        let path = self.stage_path(id, stage);
+        faults::meet(Access::Read, &path).map_err(|e| Error::io(&path, "read", e))?;
+        if let Some(expected) = self.expected().get(&(id, stage)).copied()
+            && Digest::of_file(&path)? != expected
+        {
+            let what =
+                "its bytes are not those that were written; run again, and what depends on it is made again";
+            return Err(Error::content(&path, what));
+        }
         let estimate = match &self.colmap {
             Some(maps) => maps.read(id)?,
             None => read_depth_map(&path, self.limits)?,
@@ -170,63 +197,105 @@ impl DepthStore {
                 format!("this is the depth map of image {}, not {id}; estimate it again", estimate.image_id);
             return Err(Error::content(&path, what));
         }
-        self.summaries.enter(&estimate);
+        if stage == MapStage::Final {
+            self.summaries.enter(&estimate);
+        }
         Ok(estimate)
+    }
+
+    /// Says what the file of a map must hold: then it is not read if it holds anything else.
+    pub(crate) fn expect(&self, id: ImageId, stage: MapStage, content: Digest) {
+        self.expected().insert((id, stage), content);
     }
 
     /// Makes `estimate` the depth map of its view.
     ///
     /// # Errors
     /// The file cannot be written whole, or the estimate cannot be stored (sizes that differ, more than 254 sources).
-    pub fn write(&self, estimate: DepthEstimate, lasting: Lasting) -> Result<()> {
-        self.put(Slot::Current, estimate, lasting)
+    pub fn write(&self, estimate: DepthEstimate) -> Result<()> {
+        self.write_stage(estimate, MapStage::Final, true).map(drop)
     }
 
-    /// Keeps a depth map beside the current one, which stays readable until [`DepthStore::publish`]: a pass that
-    /// reads its neighbours' maps must not see maps of its own.
+    /// Makes `estimate` the map that `stage` has left of its view; returns the digest of the file. One that is not
+    /// `lasting` may be damaged after a power failure.
     ///
     /// # Errors
     /// As [`DepthStore::write`].
-    pub fn write_pending(&self, estimate: DepthEstimate, lasting: Lasting) -> Result<()> {
-        self.put(Slot::Pending, estimate, lasting)
-    }
-
-    fn put(&self, slot: Slot, mut estimate: DepthEstimate, lasting: Lasting) -> Result<()> {
+    pub(crate) fn write_stage(
+        &self,
+        mut estimate: DepthEstimate,
+        stage: MapStage,
+        lasting: bool,
+    ) -> Result<Digest> {
+        self.check_ours()?;
         make_readable(&mut estimate);
-        let (id, estimate) = (estimate.image_id, Arc::new(estimate));
-        if lasting == Lasting::Passing && self.colmap.is_none() && self.held.hold(slot, &estimate, false) {
-            return Ok(());
-        }
+        let id = estimate.image_id;
         // A reader must not find the old map in memory once the new one is in the file, or the other way round.
-        self.held.remove(id, slot);
-        let path = match slot {
-            Slot::Current => self.path(id),
-            Slot::Pending => self.pending_path(id),
-        };
-        self.write_to(&path, &estimate)?;
+        self.held.remove((id, stage));
+        self.expected().remove(&(id, stage));
+        let path = self.stage_path(id, stage);
+        let name = name_relative_to(&self.images.find(&estimate.image_name), &self.folder);
+        let content = write_with_digest(&path, &estimate, &name, lasting)?;
         self.summaries.enter(&estimate);
-        self.held.hold(slot, &estimate, true);
-        Ok(())
+        self.expect(id, stage, content);
+        let bytes = bytes_of(&estimate);
+        self.held.insert((id, stage), Arc::new(estimate), bytes);
+        Ok(content)
     }
 
-    /// Puts the pending depth map of a view in the place of the current one.
+    /// Makes the map that `pass` has left of a view its result.
     ///
     /// # Errors
     /// There is none, or it cannot be renamed.
-    pub fn publish(&self, id: ImageId) -> Result<()> {
-        if self.held.publish(id) == Some(false) {
-            return Ok(());
+    pub(crate) fn publish(&self, id: ImageId, pass: u32) -> Result<()> {
+        let (from, to) = ((id, MapStage::Pass(pass)), (id, MapStage::Final));
+        let path = self.stage_path(id, from.1);
+        let renamed =
+            faults::meet(Access::Rename, &path).and_then(|()| std::fs::rename(&path, self.path(id)));
+        renamed.map_err(|e| Error::io(&path, "rename", e))?;
+        let mut expected = self.expected();
+        if let Some(content) = expected.remove(&from) {
+            expected.insert(to, content);
         }
-        let (pending, path) = (self.pending_path(id), self.path(id));
-        std::fs::rename(&pending, &path).map_err(|e| Error::io(&pending, "rename", e))
+        self.held.remove(to);
+        if let Some(estimate) = self.held.remove(from) {
+            let bytes = bytes_of(&estimate);
+            self.held.insert(to, estimate, bytes);
+        }
+        Ok(())
     }
 
-    /// Deletes the pending depth map of a view, if there is one and it can be.
-    pub fn discard_pending(&self, id: ImageId) {
-        self.held.remove(id, Slot::Pending);
-        self.summaries.forget(id);
-        // What remains is overwritten by the next run.
-        let _ = std::fs::remove_file(self.pending_path(id));
+    /// Brings the names of published maps to the medium.
+    pub(crate) fn sync(&self) {
+        sync_folder(&self.folder);
+    }
+
+    /// Deletes what `pass` has left of a view, if there is anything and it can be.
+    pub(crate) fn discard(&self, id: ImageId, pass: u32) {
+        let stage = MapStage::Pass(pass);
+        self.held.remove((id, stage));
+        self.expected().remove(&(id, stage));
+        // What remains is found to be unneeded by the next run.
+        let _ = std::fs::remove_file(self.stage_path(id, stage));
+    }
+
+    /// Deletes what passes of any run have left of these views.
+    pub(crate) fn discard_passes(&self, ids: &[ImageId]) {
+        let ids: HashSet<ImageId> = ids.iter().copied().collect();
+        let pass_of = |name: &str| {
+            let (id, pass) = name.strip_prefix("depth")?.strip_suffix(".dmap")?.split_once(".pass")?;
+            Some((ImageId(id.parse().ok()?), pass.parse::<u32>().ok()?))
+        };
+        for entry in std::fs::read_dir(&self.folder).into_iter().flatten().flatten() {
+            match entry.file_name().to_str().and_then(pass_of) {
+                Some((id, pass)) if ids.contains(&id) => self.discard(id, pass),
+                _ => {}
+            }
+        }
+    }
+
+    fn expected(&self) -> MutexGuard<'_, HashMap<(ImageId, MapStage), Digest>> {
+        self.expected.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Deletes the depth map of a view, if there is one.
@@ -236,7 +305,7 @@ impl DepthStore {
     pub fn delete(&self, id: ImageId) -> Result<()> {
         self.check_ours()?;
         let path = self.path(id);
-        self.held.remove(id, Slot::Current);
+        self.held.remove((id, MapStage::Final));
         match std::fs::remove_file(&path) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&path, "delete", e)),
             _ => Ok(()),
@@ -250,12 +319,13 @@ impl DepthStore {
             None => Ok(()),
         }
     }
+}
 
-    fn write_to(&self, path: &Path, estimate: &DepthEstimate) -> Result<()> {
-        self.check_ours()?;
-        let name = name_relative_to(&self.images.find(&estimate.image_name), &self.folder);
-        write_depth_map(path, estimate, &name)
-    }
+/// Bytes that an estimate takes in memory, but for small change.
+fn bytes_of(estimate: &DepthEstimate) -> usize {
+    let normal = estimate.normal.as_ref().map_or(0, |map| size_of_val(map.data()));
+    let confidence = estimate.confidence.as_ref().map_or(0, |map| size_of_val(map.data()));
+    size_of_val(estimate.depth.data()) + normal + confidence
 }
 
 /// The header of a map of COLMAP as that of a depth map of ours.
@@ -301,43 +371,25 @@ pub fn read_depth_map(path: &Path, limits: Limits) -> Result<DepthEstimate> {
 /// # Errors
 /// [`Error`] about `path`.
 pub fn write_depth_map(path: &Path, estimate: &DepthEstimate, image_name: &str) -> Result<()> {
-    let file = file_from_estimate(estimate, image_name);
-    let mut out = AtomicFile::create(path)?;
-    file.write(&mut out).map_err(|e| Error::writing(path, e))?;
-    out.commit()
+    write_with_digest(path, estimate, image_name, true).map(drop)
 }
 
-/// Largest difference of focal length and principal point in pixels of the map. Programs scale intrinsics in `f32`
-/// here and there; another calibration differs by more.
-const K_TOLERANCE: f64 = 0.02;
-/// Largest difference of an element of the rotation: a thousandth of a pixel at the border of an ordinary image.
-const ROTATION_TOLERANCE: f64 = 1e-6;
-/// Largest difference of a coordinate of the centre, relative to the larger of 1 and the coordinate: what is left of
-/// a centre after a decimal text format.
-const CENTER_TOLERANCE: f64 = 1e-7;
-
-/// In what a depth map is not the one wanted.
-fn difference(header: &DepthMapHeader, id: ImageId, camera: &Camera) -> Option<String> {
-    let size = camera.size();
-    let found = header.ids.first().copied().unwrap_or(NO_ID);
-    if found != id.0 {
-        return Some(format!("it is the depth map of image {}", ImageId(found)));
+fn write_with_digest(
+    path: &Path,
+    estimate: &DepthEstimate,
+    image_name: &str,
+    lasting: bool,
+) -> Result<Digest> {
+    let file = file_from_estimate(estimate, image_name);
+    let mut out = DigestingWriter::new(AtomicFile::create(path)?);
+    file.write(&mut out).map_err(|e| Error::writing(path, e))?;
+    let (out, content) = out.finish();
+    if lasting {
+        out.commit()?
+    } else {
+        out.commit_passing()?
     }
-    if (header.width, header.height) != (size.width, size.height) {
-        return Some(format!("it has {}×{} pixels instead of {size}", header.width, header.height));
-    }
-    let stored = super::depth_map::camera_of(header);
-    let k = (stored.k() - camera.k()).abs();
-    if [(0, 0), (1, 1), (0, 2), (1, 2)].iter().any(|&at| k[at] > K_TOLERANCE) {
-        return Some("its camera has other intrinsics than the scene's".to_owned());
-    }
-    let rotation: Matrix3<f64> = (stored.rotation() - camera.rotation()).abs();
-    if rotation.max() > ROTATION_TOLERANCE {
-        return Some("its camera has another rotation than the scene's".to_owned());
-    }
-    let apart: Vector3<f64> = (stored.center() - camera.center()).abs();
-    let moved = apart.iter().zip(camera.center()).any(|(&d, &c)| d > CENTER_TOLERANCE * c.abs().max(1.0));
-    moved.then(|| "its camera stands elsewhere than the scene's".to_owned())
+    Ok(content)
 }
 
 #[cfg(test)]
@@ -345,6 +397,7 @@ mod tests {
     use super::*;
     use crate::geometry::Size;
     use crate::scene::Grid;
+    use nalgebra::Vector3;
 
     fn estimate(id: u32, depth: f32) -> DepthEstimate {
         let size = Size::new(3, 2);
@@ -379,7 +432,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let store = store(scratch.path());
         let written = estimate(12, 4.0);
-        store.write(written.clone(), Lasting::Result).unwrap();
+        store.write(written.clone()).unwrap();
         store.take(ImageId(12)).unwrap();
         let read = store.read(ImageId(12)).unwrap();
         assert_eq!(read.image_name, "../project/images/a.jpg");
@@ -388,55 +441,50 @@ mod tests {
     }
 
     #[test]
-    fn a_new_map_replaces_the_cached_one_and_a_pending_one_waits() {
+    fn a_new_map_replaces_the_cached_one_and_those_of_passes_wait() {
         let scratch = tempfile::tempdir().unwrap();
         let store = store(scratch.path());
-        let depth = || store.read(ImageId(5)).unwrap().depth[(0, 0)];
-        store.write(estimate(5, 1.0), Lasting::Result).unwrap();
+        let id = ImageId(5);
+        let depth = || store.read(id).unwrap().depth[(0, 0)];
+        store.write(estimate(5, 1.0)).unwrap();
         assert_eq!(depth(), 1.0);
-        store.write(estimate(5, 2.0), Lasting::Result).unwrap();
+        store.write(estimate(5, 2.0)).unwrap();
         assert_eq!(depth(), 2.0);
-        store.write_pending(estimate(5, 3.0), Lasting::Result).unwrap();
+        store.write_stage(estimate(5, 3.0), MapStage::Pass(1), true).unwrap();
         assert_eq!(depth(), 2.0);
-        store.publish(ImageId(5)).unwrap();
+        assert_eq!(store.read_stage(id, MapStage::Pass(1)).unwrap().depth[(0, 0)], 3.0);
+        store.publish(id, 1).unwrap();
         assert_eq!(depth(), 3.0);
-        store.write_pending(estimate(5, 4.0), Lasting::Result).unwrap();
-        store.discard_pending(ImageId(5));
-        store.discard_pending(ImageId(5));
+        assert!(store.read_stage(id, MapStage::Pass(1)).is_err());
+        store.write_stage(estimate(5, 4.0), MapStage::Pass(1), false).unwrap();
+        store.discard(id, 1);
+        store.discard(id, 1);
         assert_eq!(depth(), 3.0);
-        assert!(store.publish(ImageId(5)).is_err());
-        store.delete(ImageId(5)).unwrap();
-        store.delete(ImageId(5)).unwrap();
-        assert!(store.read(ImageId(5)).is_err());
+        assert!(store.publish(id, 1).is_err());
+        store.delete(id).unwrap();
+        store.delete(id).unwrap();
+        assert!(store.read(id).is_err());
         assert_eq!(std::fs::read_dir(store.folder()).unwrap().count(), 0);
     }
 
     #[test]
-    fn passing_maps_have_a_file_only_where_memory_is_short() {
+    fn what_others_rely_on_is_not_read_once_it_has_changed() {
         let scratch = tempfile::tempdir().unwrap();
-        // 120 bytes each.
-        let store = DepthStore { held: HeldMaps::new(300), ..store(scratch.path()) };
-        let depth = |id| store.read(ImageId(id)).unwrap().depth[(0, 0)];
-        let files = || std::fs::read_dir(store.folder()).map_or(0, Iterator::count);
-        for id in 1..=3 {
-            store.write(estimate(id, 1.0), Lasting::Passing).unwrap();
+        // Nothing is held in memory.
+        let store = DepthStore { held: ByteCache::new(0), ..store(scratch.path()) };
+        let (id, stage) = (ImageId(5), MapStage::Pass(0));
+        store.write_stage(estimate(5, 3.0), stage, false).unwrap();
+        assert!(store.read_stage(id, stage).is_ok());
+        let path = store.stage_path(id, stage);
+        let whole = std::fs::read(&path).unwrap();
+        for at in 0..whole.len() {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1;
+            std::fs::write(&path, bytes).unwrap();
+            assert!(store.read_stage(id, stage).is_err(), "byte {at}");
         }
-        assert_eq!(files(), 1, "two of three fit");
-        for id in 1..=3 {
-            store.write_pending(estimate(id, 2.0), Lasting::Passing).unwrap();
-        }
-        assert_eq!([1, 2, 3].map(depth), [1.0; 3]);
-        (1..=3).for_each(|id| store.publish(ImageId(id)).unwrap());
-        assert_eq!([1, 2, 3].map(depth), [2.0; 3]);
-        for id in 1..=3 {
-            store.write_pending(estimate(id, 3.0), Lasting::Result).unwrap();
-        }
-        (1..=3).for_each(|id| store.publish(ImageId(id)).unwrap());
-        assert_eq!(files(), 3);
-        assert_eq!([1, 2, 3].map(|id| store.take(ImageId(id)).unwrap().depth[(0, 0)]), [3.0; 3]);
-        std::fs::remove_file(store.path(ImageId(1))).unwrap();
-        assert!(store.read(ImageId(1)).is_err(), "whoever needed it last has taken it");
-        assert_eq!(store.summary(ImageId(1)).unwrap().valid_depths, 6);
+        std::fs::write(&path, &whole).unwrap();
+        assert!(store.read_stage(id, stage).is_ok());
     }
 
     #[test]
@@ -447,7 +495,7 @@ mod tests {
         let (size, k, rotation, center) =
             (ours.camera.size(), *ours.camera.k(), *ours.camera.rotation(), *ours.camera.center());
         assert!(matches!(store.existing(ImageId(5), &ours.camera), Existing::Absent));
-        store.write(ours.clone(), Lasting::Result).unwrap();
+        store.write(ours.clone()).unwrap();
         let verdict = |camera: Camera| match store.existing(ImageId(5), &camera) {
             Existing::Absent => panic!("absent"),
             Existing::Usable => String::new(),
@@ -482,7 +530,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let store = store(scratch.path());
         for id in 0..8 {
-            store.write(estimate(id, 1.0 + id as f32), Lasting::Result).unwrap();
+            store.write(estimate(id, 1.0 + id as f32)).unwrap();
         }
         std::thread::scope(|scope| {
             for start in 0..4 {

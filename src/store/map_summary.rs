@@ -51,10 +51,6 @@ impl Summaries {
         self.lock().insert(estimate.image_id, summary);
     }
 
-    pub(super) fn forget(&self, id: ImageId) {
-        self.lock().remove(&id);
-    }
-
     fn lock(&self) -> MutexGuard<'_, HashMap<ImageId, MapSummary>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

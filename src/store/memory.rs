@@ -3,6 +3,21 @@
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
+/// Share of the memory of the machine, or of what its control group allows, that a run takes at most unless more is asked
+/// for.
+const SHARE: f64 = 0.7;
+
+/// Bytes that a run may take in all: `typed`, else 70 % of what the machine has or the control group allows; without
+/// bound where nothing is known.
+pub(crate) fn allowed(typed: Option<u64>) -> u64 {
+    let machine = read("/proc/meminfo").and_then(|text| field(&text, "MemTotal:")).map(|kib| kib << 10);
+    let there = [machine, group(|folder| number_in(folder, "memory.max"))].into_iter().flatten().min();
+    let share = there.map(|bytes| (bytes as f64 * SHARE) as u64);
+    let stated = std::env::var(LIMIT_VARIABLE).ok().and_then(|v| v.trim().parse::<u64>().ok());
+    let default = [share, stated.map(|mib| mib << 20)].into_iter().flatten().min();
+    typed.or(default).unwrap_or(u64::MAX >> 1)
+}
+
 /// Environment variable that says how many MiB may be used, less than there are.
 pub(crate) const LIMIT_VARIABLE: &str = "SEMVS_MEMORY_MIB";
 
@@ -27,18 +42,18 @@ pub(crate) fn require(bytes: u64, work: &str) -> Result<()> {
 fn available() -> Option<u64> {
     let typed = std::env::var(LIMIT_VARIABLE).ok().and_then(|v| v.trim().parse::<u64>().ok());
     let machine = read("/proc/meminfo").and_then(|text| field(&text, "MemAvailable:")).map(|kib| kib << 10);
-    [typed.map(|mib| mib << 20), machine, group()].into_iter().flatten().min()
+    [typed.map(|mib| mib << 20), machine, group(left_in)].into_iter().flatten().min()
 }
 
-/// What the control groups of this process, and those above them, leave.
-fn group() -> Option<u64> {
+/// The least that `of` says of the control groups of this process and those above them.
+fn group(of: impl Fn(&Path) -> Option<u64>) -> Option<u64> {
     let text = read("/proc/self/cgroup")?;
     let own = text.lines().find_map(|line| line.strip_prefix("0::"))?.trim_start_matches('/').to_owned();
     let root = Path::new("/sys/fs/cgroup");
     let mut folder = root.join(own);
     let mut least = None;
     loop {
-        least = [least, left_in(&folder)].into_iter().flatten().min();
+        least = [least, of(&folder)].into_iter().flatten().min();
         if folder == root || !folder.pop() || !folder.starts_with(root) {
             return least;
         }
@@ -47,10 +62,15 @@ fn group() -> Option<u64> {
 
 /// What one control group leaves; files that are only cached can be given up.
 fn left_in(folder: &Path) -> Option<u64> {
-    let number = |name: &str| read(folder.join(name))?.trim().parse::<u64>().ok();
+    let number = |name: &str| number_in(folder, name);
     let limit = number("memory.max")?;
     let cached = read(folder.join("memory.stat")).and_then(|text| field(&text, "inactive_file")).unwrap_or(0);
     Some(limit.saturating_sub(number("memory.current")?.saturating_sub(cached)))
+}
+
+/// The number in a file of a control group.
+fn number_in(folder: &Path, name: &str) -> Option<u64> {
+    read(folder.join(name))?.trim().parse().ok()
 }
 
 /// The number after `name` in a table of names and numbers.

@@ -16,5 +16,6 @@ mod exchange;
 mod labels;
 mod masks;
 mod pipelines;
+mod resume;
 mod runs;
 mod strict_openmvs;

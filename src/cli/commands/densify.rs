@@ -19,6 +19,7 @@ use std::sync::Arc;
 /// Runs the command.
 pub(crate) fn densify(args: &DensifyArgs, typed: &ArgMatches, recorder: &Arc<Recorder>) -> Result<()> {
     let job = job(args, typed, &resolver(&args.shared, recorder)?)?;
+    recorder.heed_interrupts();
     let report = pipeline::densify(&job, resolve::cpu()?, &recorder.progress())?;
     let mut options = effective::options_in_effect::<DensifyArgs>(typed);
     effective::resolve(&mut options, &job.input, &job.outputs, None, Some(&job.filter), &job.fusion);
@@ -57,6 +58,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         input: resolver.scene(args.scene.clone(), folder.clone())?,
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder },
+        force: shared.run.force,
         pictures: false,
         stereo: resolver.stereo(Quality::Normal)?,
         filter: resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?,

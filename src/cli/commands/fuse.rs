@@ -17,6 +17,7 @@ use std::sync::Arc;
 /// Runs the command.
 pub(crate) fn fuse(args: &FuseArgs, typed: &ArgMatches, recorder: &Arc<Recorder>) -> Result<()> {
     let job = job(args, typed, &resolver(&args.shared, recorder)?)?;
+    recorder.heed_interrupts();
     let report = pipeline::fuse(&job, &recorder.progress())?;
     let mut options = effective::options_in_effect::<FuseArgs>(typed);
     let folder = match &job.depth_maps {

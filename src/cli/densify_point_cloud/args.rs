@@ -153,7 +153,9 @@ pub(crate) const BEYOND: &[&str] = &[
     "las-normals",
     "filter",
     "quality",
+    "max-memory",
     "strict",
+    "force",
     "strict-openmvs",
     "estimate-segmentation",
 ];

@@ -168,6 +168,7 @@ mod tests {
                     "quality" => "draft".into(),
                     "label-votes" => "merged".into(),
                     "label-filter" => "on".into(),
+                    "max-memory" => "4G".into(),
                     "offset" => "1,-2,3".into(),
                     _ => "1".into(),
                 });

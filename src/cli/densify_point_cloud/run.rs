@@ -99,7 +99,9 @@ fn run(typing: &Typing, folder: &Path, log: &Log, recorder: &Arc<Recorder>) -> R
         return Ok(());
     }
     let start = Instant::now();
+    recorder.heed_interrupts();
     let mut report = match pipeline::densify(&job, resolve::cpu()?, &progress) {
+        Err(error @ (Error::Interrupted | Error::OutOfMemory(_))) => return Err(error),
         Err(error) if args.strict_openmvs && job.depth_maps_only && pipeline::is_readable(&job.input) => {
             log.error(&error.to_string());
             log.line(0, &format!("Depth-maps estimated ({})", duration::text(start.elapsed())));
@@ -156,6 +158,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         input: scene,
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() },
+        force: shared.run.force,
         pictures: args.verbosity >= PICTURES,
         stereo: resolver.stereo(Quality::High)?,
         filter: resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,

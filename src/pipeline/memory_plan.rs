@@ -1,0 +1,95 @@
+//! How the memory that a run may take is shared out, decided before any long work.
+
+use super::job::SceneJob;
+use super::prepare::pixels_in_hand;
+use crate::depth_filter::MAX_NEIGHBORS;
+use crate::error::{Error, Result};
+use crate::fusion::FusionOptions;
+use crate::geometry::Camera;
+use crate::store::memory;
+use crate::store::spool::DEFAULT_SPOOL_MEMORY;
+
+/// What the program takes without any image.
+const BASE: u64 = 48 << 20;
+/// Bytes per pixel of a map in memory.
+pub(super) const MAP_BYTES: u64 = 20;
+/// Bytes per pixel of a view while it is estimated: reference, state of two levels, the map twice.
+const VIEW_BYTES: u64 = 90;
+/// Bytes per pixel and source view: its luma, what is made of it, its map and what is made of that.
+const SOURCE_BYTES: u64 = 38;
+/// Bytes per pixel of a view's maps while they are fused.
+const FUSED_BYTES: u64 = 27;
+/// Bytes per pixel of a photograph while it is decoded and scaled.
+const DECODED_BYTES: u64 = 4;
+
+/// What each part of a run may take, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct MemoryPlan {
+    /// Views that are worked on at a time.
+    pub(super) views_at_once: usize,
+    /// Depth maps kept between their uses.
+    pub(super) maps: usize,
+    /// Luma kept.
+    pub(super) grays: usize,
+    /// Colours kept.
+    pub(super) colors: usize,
+    /// Maps kept between their uses by fusion.
+    pub(super) fusion: u64,
+    /// Points kept until the cloud is written; the rest waits in a file.
+    pub(super) points: u64,
+}
+
+/// Least and most memory for depth maps between the passes, where there is enough.
+const MAPS: (u64, u64) = (176 << 20, 4 << 30);
+/// The same for luma.
+const GRAYS: (u64, u64) = (64 << 20, 4 << 30);
+/// Memory for colours.
+const COLORS: u64 = 64 << 20;
+
+impl MemoryPlan {
+    /// Shares out what `job` may take for views with these cameras; `estimates`: depth maps are made.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] if a single view at a time is too much.
+    pub(super) fn of(job: &SceneJob, cameras: &[Option<Camera>], estimates: bool) -> Result<Self> {
+        let limit = memory::allowed(job.max_memory);
+        let threads = rayon::current_num_threads();
+        let sources = most_sources(job) as u64;
+        let area = cameras.iter().flatten().map(|c| c.size().area() as u64).max().unwrap_or(0);
+        let in_hand = pixels_in_hand(job, cameras) as u64;
+        let decoded = area * DECODED_BYTES * threads as u64;
+        let one = area * (VIEW_BYTES + SOURCE_BYTES * sources);
+        let group = area * FUSED_BYTES * (1 + (job.neighbors.max_views as u64).max(sources));
+        let least = BASE + decoded + if estimates { one.max(group) } else { group };
+        if least > limit {
+            let (least, limit) = (least.div_ceil(1 << 20), limit >> 20);
+            return Err(Error::OutOfMemory(format!(
+                "a view and its neighbours need {least} MiB, {limit} MiB may be used: give --max-memory {least}M if there is as \
+                 much, else a lower --max-resolution, fewer --number-views, or split the scene with --sub-scene-area"
+            )));
+        }
+        let free = limit - BASE - decoded;
+        let views_at_once = (free * 3 / 4 / one.max(1)).clamp(1, threads as u64);
+        let cached = if estimates { free - (views_at_once * one).min(free) } else { free / 2 };
+        let share = |part: u64, wanted: u64, (least, most): (u64, u64)| {
+            wanted.clamp(least, most).min(cached / part) as usize
+        };
+        let points = DEFAULT_SPOOL_MEMORY.min(free / 8);
+        Ok(MemoryPlan {
+            views_at_once: views_at_once as usize,
+            maps: share(2, in_hand * MAP_BYTES, MAPS),
+            grays: share(4, in_hand * size_of::<f32>() as u64, GRAYS),
+            colors: share(8, 0, (COLORS, COLORS)),
+            fusion: FusionOptions::default().map_memory.min(free * 5 / 8).max(group.min(free)),
+            points,
+        })
+    }
+}
+
+/// Largest number of views that one is matched with.
+fn most_sources(job: &SceneJob) -> usize {
+    match job.neighbors.number_views {
+        0 => job.neighbors.max_views,
+        typed => typed.min(MAX_NEIGHBORS.max(job.neighbors.max_views)),
+    }
+}
