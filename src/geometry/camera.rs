@@ -49,6 +49,11 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// The same camera, its centre moved by `offset`, scene units.
+    pub fn moved(&self, offset: &Vector3<f64>) -> Camera {
+        Camera::new(self.size(), *self.k(), *self.rotation(), self.center() + offset)
+    }
+
     /// A camera with intrinsics `k` in pixels of `size`, rotation camera-from-world and centre in the world.
     pub fn new(size: Size, k: Matrix3<f64>, rotation: Matrix3<f64>, center: Vector3<f64>) -> Self {
         let kr = k * rotation;

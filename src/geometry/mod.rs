@@ -2,6 +2,7 @@
 
 mod camera;
 mod lens;
+mod local_origin;
 mod nearest;
 mod placement;
 mod roi;
@@ -9,6 +10,7 @@ mod similarity;
 
 pub use camera::{Camera, Size, normalized_k};
 pub(crate) use lens::Lens;
+pub use local_origin::local_origin;
 pub(crate) use nearest::{Nearest, NearestIndex};
 pub use placement::Placement;
 pub use roi::Roi;

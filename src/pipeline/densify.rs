@@ -51,7 +51,8 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
     create_folder(&job.depth_maps)?;
     let mut lock = enter_folder(job, progress)?;
-    let loaded = load(&job.input, progress)?;
+    let mut loaded = load(&job.input, progress)?;
+    loaded.make_local();
     let mut cameras = working_cameras(&loaded, &job.resolution, job.input.strict, progress)?;
     if job.only_fuses() {
         take_sizes_of_maps(&loaded, &mut cameras, &job.depth_maps, progress);
@@ -60,8 +61,9 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     clock.stage("load");
     let memory = MemoryPlan::of(&job.input, &cameras, !job.only_fuses())?;
     let mut prepared = prepare(&job.input, &job.outputs, loaded, cameras, true, &memory, progress)?;
-    let search = prepared.loaded.search.clone();
-    let store = DepthStore::new(&job.depth_maps, search, memory.maps, Limits::default());
+    let LoadedScene { search, origin, .. } = &prepared.loaded;
+    let store = DepthStore::new(&job.depth_maps, search.clone(), memory.maps, Limits::default());
+    let store = store.with_origin(*origin);
     clock.stage("prepare");
 
     let reuse = reuse(job);
@@ -180,6 +182,7 @@ fn take_sizes_of_maps(
     progress: &Progress,
 ) {
     let store = DepthStore::new(folder, loaded.search.clone(), 0, Limits::default());
+    let store = store.with_origin(loaded.origin);
     let mut other = 0usize;
     for (view, camera) in loaded.scene.views.iter().zip(cameras) {
         let (Some(camera), Some(calibration)) = (camera, &view.calibration) else { continue };
@@ -295,6 +298,7 @@ pub(super) fn write_results(
         None => cloud,
     };
     let place = placement(outputs, &prepared.loaded.archive, progress);
+    let place = place.after_shift(prepared.loaded.origin.into());
     let written = write_cloud(outputs, cloud, labels, place, progress)?;
     report.points = fused.cloud.len();
     report.outputs.extend(cloud_rows(&written, labels.map(Labels::table)));

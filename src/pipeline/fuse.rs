@@ -45,7 +45,8 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let classes = check_inputs(&job.input)?;
     check_report(&job.outputs, &named_files(&job.input))?;
     check_places(&job.outputs, classes.as_ref().map(Classes::parts))?;
-    let loaded = load(&job.input, progress)?;
+    let mut loaded = load(&job.input, progress)?;
+    loaded.make_local();
     let store = open_maps(&job.depth_maps, &loaded)?;
     let cameras = match &job.resolution {
         Some(resolution) => working_cameras(&loaded, resolution, job.input.strict, progress)?,
@@ -78,7 +79,8 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
 fn open_maps(maps: &DepthMapsJob, loaded: &LoadedScene) -> Result<DepthStore> {
     match (maps, &loaded.workspace) {
         (DepthMapsJob::Folder(folder), _) => {
-            Ok(DepthStore::new(folder, loaded.search.clone(), 0, Limits::default()))
+            let store = DepthStore::new(folder, loaded.search.clone(), 0, Limits::default());
+            Ok(store.with_origin(loaded.origin))
         }
         (DepthMapsJob::Colmap(pass), Some(workspace)) => {
             let passes = pass.map_or_else(|| Pass::ALL.to_vec(), |pass| vec![pass]);

@@ -10,7 +10,7 @@ use super::sparse::{override_from_file, replace_points};
 use super::tower::use_tower;
 use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
-use crate::geometry::Camera;
+use crate::geometry::{Camera, Placement, local_origin};
 use crate::progress::{Event, Progress, SceneSummary};
 use crate::scene::{
     ImageId, NeighborOptions, Scene, Tracks, ViewIndex, ViewNeighbors, estimate_roi, select_neighbors,
@@ -103,25 +103,27 @@ pub(super) fn load(job: &SceneJob, progress: &Progress) -> Result<LoadedScene> {
     Ok(loaded)
 }
 
-/// Says when the cameras are so far from the origin that points, which have 32-bit coordinates, cannot be exact there.
+/// Says when the scene is so far from the origin that 32-bit coordinates, which clouds have by default, are coarse there, or
+/// that it was moved for them not to be.
 fn warn_of_coarse_coordinates(loaded: &LoadedScene, progress: &Progress) {
-    /// Coarsest step between neighbouring coordinates that does no harm, as a share of the cameras' extent.
-    const COARSEST: f64 = 1e-5;
-    let centers: Vec<Vector3<f64>> =
-        loaded.scene.views.iter().filter_map(|v| v.calibration.as_ref()).map(|c| c.center).collect();
-    let Some(&first) = centers.first() else { return };
-    let (low, high) = centers.iter().fold((first, first), |(low, high), c| (low.inf(c), high.sup(c)));
-    let step = low.amax().max(high.amax()) * f64::from(f32::EPSILON);
-    if step > COARSEST * (high - low).amax() {
-        let shift = low.map(f64::floor);
+    let place = loaded.path.display();
+    let in_doubles = "--ply-doubles, .las or .laz";
+    let centers = loaded.scene.views.iter().filter_map(|v| v.calibration.as_ref()).map(|c| c.center);
+    let origin = local_origin(centers);
+    if origin != Vector3::zeros() {
+        let step = origin.amax() * f64::from(f32::EPSILON);
         let digits = (1.0 - step.log10().floor()).max(0.0) as usize;
         progress.warn(format!(
-            "{}: so far from the origin 32-bit coordinates are about {step:.digits$} apart, and clouds show stripes; shift the \
-             scene to its cameras and give --offset {},{},{} with .las, .laz or --ply-doubles",
-            loaded.path.display(),
-            shift.x,
-            shift.y,
-            shift.z
+            "{place}: so far from the origin 32-bit coordinates are about {step:.digits$} apart, and clouds show stripes; \
+             {in_doubles} have all digits"
+        ));
+    } else if let Some(moved) = Placement::undoing(&loaded.archive.transform)
+        .filter(|moved| loaded.workspace.is_some() && !moved.is_identity())
+    {
+        let [x, y, z] = moved.offset();
+        progress.warn(format!(
+            "{place}: so far from the origin 32-bit coordinates are coarse; they are relative to ({x}, {y}, {z}), {in_doubles} \
+             give the place itself"
         ));
     }
 }

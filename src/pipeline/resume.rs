@@ -123,7 +123,7 @@ impl Plan {
             self.find_work(recipe, store, false);
         }
         for (&view, &content) in given.iter().filter(|(view, _)| !self.finished.contains(view)) {
-            store.expect(recipe.prepared.id(view), MapStage::Final, content);
+            store.rely_on(recipe.prepared.id(view), MapStage::Final, content);
         }
         let by_id = given.iter().map(|(&view, &content)| (recipe.prepared.id(view).0, content));
         self.journal.begin(by_id.collect())
@@ -164,7 +164,7 @@ impl Plan {
         let found = places.into_iter().flatten().find(|&place| {
             Digest::of_file(&store.stage_path(id, place)).is_ok_and(|content| content == mark.content)
         })?;
-        store.expect(id, found, mark.content);
+        store.rely_on(id, found, mark.content);
         Some(found)
     }
 

@@ -105,6 +105,14 @@ impl Tracks {
         self.points.push(point);
     }
 
+    /// Moves all points by `offset`, in doubles.
+    pub fn shift(&mut self, offset: &Vector3<f64>) {
+        for point in &mut self.points {
+            let moved = Vector3::from(point.map(f64::from)) + offset;
+            *point = [moved.x as f32, moved.y as f32, moved.z as f32];
+        }
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()

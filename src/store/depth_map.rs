@@ -1,5 +1,6 @@
 //! Between the depth maps of the scene and those of files.
 
+use super::colmap::ColmapMapHeader;
 use crate::geometry::{Camera, Size};
 use crate::scene::{DepthEstimate, Grid, ImageId};
 use nalgebra::{Matrix3, Vector3};
@@ -13,6 +14,26 @@ pub(super) fn camera_of(header: &DepthMapHeader) -> Camera {
     let image = Camera::new(Size::new(header.image_width, header.image_height), k, rotation, center);
     let size = Size::new(header.width, header.height);
     if image.size() == size { image } else { image.scaled_per_axis(size) }
+}
+
+/// The header of a map of COLMAP as that of a depth map of ours.
+pub(super) fn colmap_header(id: ImageId, header: ColmapMapHeader) -> DepthMapHeader {
+    let camera = &header.camera;
+    let row_major = |m: &Matrix3<f64>| std::array::from_fn(|i| m[(i / 3, i % 3)]);
+    let (width, height) = (camera.size().width, camera.size().height);
+    DepthMapHeader {
+        image_width: width,
+        image_height: height,
+        width,
+        height,
+        image_name: header.image_name.into_bytes(),
+        ids: vec![id.0],
+        k: row_major(camera.k()),
+        rotation: row_major(camera.rotation()),
+        center: (*camera.center()).into(),
+        has_normal: header.has_normal,
+        ..DepthMapHeader::default()
+    }
 }
 
 /// The estimate that a file holds.
@@ -63,9 +84,12 @@ fn plane<T>(size: Size, data: Vec<T>) -> Result<Option<Grid<T>>, ()> {
     if data.is_empty() { Ok(None) } else { Grid::from_vec(size, data).map(Some).ok_or(()) }
 }
 
-/// The file for an estimate; image size is map size, as OpenMVS has it.
-pub(super) fn file_from_estimate(estimate: &DepthEstimate, image_name: &str) -> DepthMapFile {
-    let camera = &estimate.camera;
+/// The file for an estimate, with its camera in the coordinates of the file; image size is map size, as OpenMVS has it.
+pub(super) fn file_from_estimate(
+    estimate: &DepthEstimate,
+    camera: &Camera,
+    image_name: &str,
+) -> DepthMapFile {
     let row_major = |m: &Matrix3<f64>| std::array::from_fn(|i| m[(i / 3, i % 3)]);
     let size = estimate.depth.size();
     DepthMapFile {
@@ -148,7 +172,8 @@ mod tests {
         plain.confidence.clear();
         for file in [file(), plain] {
             let estimate = estimate_from_file(file).unwrap();
-            let back = estimate_from_file(file_from_estimate(&estimate, "images/a.jpg")).unwrap();
+            let back =
+                estimate_from_file(file_from_estimate(&estimate, &estimate.camera, "images/a.jpg")).unwrap();
             assert_eq!(back, estimate);
         }
     }

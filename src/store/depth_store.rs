@@ -2,8 +2,8 @@
 
 use super::atomic::{AtomicFile, sync_folder};
 use super::byte_cache::ByteCache;
-use super::colmap::{ColmapMapHeader, ColmapMaps};
-use super::depth_map::{estimate_from_file, file_from_estimate, make_readable};
+use super::colmap::ColmapMaps;
+use super::depth_map::{colmap_header, estimate_from_file, file_from_estimate, make_readable};
 use super::digest::{Digest, DigestingWriter};
 use super::faults::{self, Access};
 use super::map_fit::difference;
@@ -12,7 +12,7 @@ use super::paths::{SearchPath, name_relative_to};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::scene::{DepthEstimate, ImageId};
-use nalgebra::Matrix3;
+use nalgebra::Vector3;
 use semvs_formats::Limits;
 use semvs_formats::dmap::{DepthMapFile, DepthMapHeader, read_header};
 use std::collections::{HashMap, HashSet};
@@ -55,6 +55,8 @@ pub struct DepthStore {
     /// What files must hold that others rely on.
     expected: Mutex<HashMap<(ImageId, MapStage), Digest>>,
     summaries: Summaries,
+    /// Where the origin of the cameras is in the coordinates of the files.
+    origin: Vector3<f64>,
     /// The maps of a COLMAP workspace instead of those in `folder`; they are only read.
     colmap: Option<ColmapMaps>,
 }
@@ -65,7 +67,13 @@ impl DepthStore {
     pub fn new(folder: &Path, images: SearchPath, memory: usize, limits: Limits) -> Self {
         let (held, summaries) = (ByteCache::new(memory), Summaries::default());
         let (folder, expected) = (folder.to_owned(), Mutex::default());
-        DepthStore { folder, images, limits, held, expected, summaries, colmap: None }
+        let origin = Vector3::zeros();
+        DepthStore { folder, images, limits, held, expected, summaries, origin, colmap: None }
+    }
+
+    /// The same for cameras whose origin is at `origin` in the coordinates of the files.
+    pub fn with_origin(self, origin: Vector3<f64>) -> Self {
+        DepthStore { origin, ..self }
     }
 
     /// The maps of a COLMAP workspace. Nothing can be written; nothing is kept in memory.
@@ -112,7 +120,7 @@ impl DepthStore {
         match self.header(id) {
             Err(error) => Existing::Unusable(error.to_string()),
             Ok(None) => Existing::Absent,
-            Ok(Some(header)) => match difference(&header, id, camera) {
+            Ok(Some(header)) => match difference(&header, id, &camera.moved(&self.origin)) {
                 Some(what) => Existing::Unusable(format!("{}: {what}", self.path(id).display())),
                 None => Existing::Usable,
             },
@@ -146,7 +154,7 @@ impl DepthStore {
     /// The depth map of a view that `stage` has left, from memory if it is there.
     ///
     /// # Errors
-    /// As [`DepthStore::read`]; the bytes of the file are others than [`DepthStore::expect`] said.
+    /// As [`DepthStore::read`]; the bytes of the file are others than [`DepthStore::rely_on`] said.
     pub fn read_stage(&self, id: ImageId, stage: MapStage) -> Result<Arc<DepthEstimate>> {
         let load = || {
             let estimate = self.read_file(id, stage)?;
@@ -188,10 +196,11 @@ impl DepthStore {
                 "its bytes are not those that were written; run again, and what depends on it is made again";
             return Err(Error::content(&path, what));
         }
-        let estimate = match &self.colmap {
+        let mut estimate = match &self.colmap {
             Some(maps) => maps.read(id)?,
             None => read_depth_map(&path, self.limits)?,
         };
+        estimate.camera = estimate.camera.moved(&-self.origin);
         if estimate.image_id != id {
             let what =
                 format!("this is the depth map of image {}, not {id}; estimate it again", estimate.image_id);
@@ -204,7 +213,7 @@ impl DepthStore {
     }
 
     /// Says what the file of a map must hold: then it is not read if it holds anything else.
-    pub(crate) fn expect(&self, id: ImageId, stage: MapStage, content: Digest) {
+    pub(crate) fn rely_on(&self, id: ImageId, stage: MapStage, content: Digest) {
         self.expected().insert((id, stage), content);
     }
 
@@ -235,9 +244,10 @@ impl DepthStore {
         self.expected().remove(&(id, stage));
         let path = self.stage_path(id, stage);
         let name = name_relative_to(&self.images.find(&estimate.image_name), &self.folder);
-        let content = write_with_digest(&path, &estimate, &name, lasting)?;
+        let camera = estimate.camera.moved(&self.origin);
+        let content = write_with_digest(&path, &estimate, &camera, &name, lasting)?;
         self.summaries.enter(&estimate);
-        self.expect(id, stage, content);
+        self.rely_on(id, stage, content);
         let bytes = bytes_of(&estimate);
         self.held.insert((id, stage), Arc::new(estimate), bytes);
         Ok(content)
@@ -328,26 +338,6 @@ fn bytes_of(estimate: &DepthEstimate) -> usize {
     size_of_val(estimate.depth.data()) + normal + confidence
 }
 
-/// The header of a map of COLMAP as that of a depth map of ours.
-fn colmap_header(id: ImageId, header: ColmapMapHeader) -> DepthMapHeader {
-    let camera = &header.camera;
-    let row_major = |m: &Matrix3<f64>| std::array::from_fn(|i| m[(i / 3, i % 3)]);
-    let (width, height) = (camera.size().width, camera.size().height);
-    DepthMapHeader {
-        image_width: width,
-        image_height: height,
-        width,
-        height,
-        image_name: header.image_name.into_bytes(),
-        ids: vec![id.0],
-        k: row_major(camera.k()),
-        rotation: row_major(camera.rotation()),
-        center: (*camera.center()).into(),
-        has_normal: header.has_normal,
-        ..DepthMapHeader::default()
-    }
-}
-
 /// Reads what the depth map at `path` says before its planes.
 ///
 /// # Errors
@@ -371,16 +361,17 @@ pub fn read_depth_map(path: &Path, limits: Limits) -> Result<DepthEstimate> {
 /// # Errors
 /// [`Error`] about `path`.
 pub fn write_depth_map(path: &Path, estimate: &DepthEstimate, image_name: &str) -> Result<()> {
-    write_with_digest(path, estimate, image_name, true).map(drop)
+    write_with_digest(path, estimate, &estimate.camera, image_name, true).map(drop)
 }
 
 fn write_with_digest(
     path: &Path,
     estimate: &DepthEstimate,
+    camera: &Camera,
     image_name: &str,
     lasting: bool,
 ) -> Result<Digest> {
-    let file = file_from_estimate(estimate, image_name);
+    let file = file_from_estimate(estimate, camera, image_name);
     let mut out = DigestingWriter::new(AtomicFile::create(path)?);
     file.write(&mut out).map_err(|e| Error::writing(path, e))?;
     let (out, content) = out.finish();
@@ -397,7 +388,7 @@ mod tests {
     use super::*;
     use crate::geometry::Size;
     use crate::scene::Grid;
-    use nalgebra::Vector3;
+    use nalgebra::Matrix3;
 
     fn estimate(id: u32, depth: f32) -> DepthEstimate {
         let size = Size::new(3, 2);

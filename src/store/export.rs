@@ -6,6 +6,7 @@ use super::paths::{SearchPath, clean_name, name_relative_to};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Roi};
 use crate::scene::{Neighbor, PointSource, Scene, ViewIndex, ViewNeighbors};
+use nalgebra::Vector3;
 use semvs_formats::mvs::{self, NEWEST_VERSION, NO_ID};
 use std::path::Path;
 
@@ -23,7 +24,16 @@ pub fn interface_archive(
         platforms: export_platforms(&loaded.archive, cameras),
         images: loaded.archive.images.clone(),
         points: loaded.archive.points.clone(),
-        obb: loaded.scene.roi.as_ref().map(export_roi),
+        obb: loaded
+            .scene
+            .roi
+            .as_ref()
+            .map(|roi| export_roi(&Roi { center: roi.center + loaded.origin, ..roi.clone() })),
+        // A model that was moved says so.
+        transform: loaded
+            .workspace
+            .as_ref()
+            .map_or(mvs::Scene::default().transform, |_| loaded.archive.transform),
         ..mvs::Scene::default()
     };
     for (i, image) in archive.images.iter_mut().enumerate() {
@@ -60,7 +70,8 @@ pub fn project_archive(
     let mut points = mvs::PointCloud::default();
     let mut images = Vec::new();
     cloud.for_each(&mut |point| {
-        points.positions.push(point.position);
+        let place = Vector3::from(point.position.map(f64::from)) + loaded.origin;
+        points.positions.push([place.x as f32, place.y as f32, place.z as f32]);
         if has.normals {
             points.normals.push(point.normal);
         }

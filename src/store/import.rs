@@ -4,7 +4,7 @@ use super::colmap::Workspace;
 use super::images::image_size;
 use super::paths::{SearchPath, clean_name};
 use crate::error::{Error, Result};
-use crate::geometry::{Roi, Size, normalized_k};
+use crate::geometry::{Roi, Size, local_origin, normalized_k};
 use crate::progress::Progress;
 use crate::scene::{Calibration, ImageId, Neighbor, Scene, Tracks, View, ViewIndex};
 use nalgebra::{Matrix3, Vector3};
@@ -27,9 +27,29 @@ pub struct LoadedScene {
     pub search: SearchPath,
     /// The workspace, if the scene is one.
     pub workspace: Option<Workspace>,
+    /// Where the origin of [`LoadedScene::scene`] is in the coordinates of [`LoadedScene::archive`].
+    pub origin: Vector3<f64>,
 }
 
 impl LoadedScene {
+    /// Moves a scene that is far from the origin near it, for single precision to be enough.
+    pub fn make_local(&mut self) {
+        let centers = self.scene.views.iter().filter_map(|v| v.calibration.as_ref()).map(|c| c.center);
+        let origin = local_origin(centers);
+        if origin == Vector3::zeros() {
+            return;
+        }
+        let shift = -origin;
+        for calibration in self.scene.views.iter_mut().filter_map(|v| v.calibration.as_mut()) {
+            calibration.center += shift;
+        }
+        self.scene.tracks.shift(&shift);
+        if let Some(roi) = &mut self.scene.roi {
+            roi.center += shift;
+        }
+        self.origin += origin;
+    }
+
     /// The photograph of a view.
     pub fn image_path(&self, view: ViewIndex) -> PathBuf {
         self.search.find(&self.scene.views[view.index()].name)
@@ -93,7 +113,15 @@ pub fn load_scene(
     }
     let roi = archive.obb.as_ref().map(import_roi);
     let scene = Scene { views, tracks, roi };
-    Ok(LoadedScene { scene, archive, container, path: path.to_owned(), search, workspace })
+    Ok(LoadedScene {
+        scene,
+        archive,
+        container,
+        path: path.to_owned(),
+        search,
+        workspace,
+        origin: Vector3::zeros(),
+    })
 }
 
 /// The views in file order.

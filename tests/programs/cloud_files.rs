@@ -177,7 +177,7 @@ fn scenes_that_stand_at_utm_coordinates_are_told_of() {
     mvs::write_interface(&mut bytes, &scene, mvs::NEWEST_VERSION).unwrap();
     scratch.write("scene.mvs", bytes);
     let stderr = scratch.semvs(fuse).stderr;
-    assert!(stderr.contains("are about 0.62 apart") && stderr.contains("--offset 499"), "{stderr}");
+    assert!(stderr.contains("are about 0.62 apart") && stderr.contains("--ply-doubles"), "{stderr}");
 }
 
 /// Ids of `ade20k` for those of `3dom-facade`; 3 is the sky, which is no surface.

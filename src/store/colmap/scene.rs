@@ -1,6 +1,7 @@
 //! From a sparse model to the scene value of `.mvs` files.
 
 use crate::error::{Error, Result};
+use crate::geometry::local_origin;
 use nalgebra::{Matrix3, Vector3};
 use semvs_formats::colmap::{Camera, Image, Model, Points};
 use semvs_formats::mvs::{self, NO_ID};
@@ -14,6 +15,9 @@ const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 /// The model as a scene whose image names are `prefix` and the model's names. Images and points keep their order; global
 /// IDs are COLMAP's less one, as OpenMVS's importer has it (as they are, if one is 0).
+///
+/// A model far from the origin is moved near it in doubles, which the scene's transform says, so that points can have 32-bit
+/// coordinates.
 ///
 /// Images of one camera, or of equal ones, share a platform; every image has a pose of its own. Errors and ids of
 /// points and the key points are dropped.
@@ -58,7 +62,15 @@ pub(super) fn scene_from_model(model: &Model, prefix: &str, place: &Path) -> Res
             ..mvs::Image::default()
         });
     }
-    scene.points = points_from(&model.points, model, place)?;
+    let centers = scene.platforms.iter().flat_map(|platform| &platform.poses);
+    let origin = local_origin(centers.map(|pose| Vector3::from(pose.center)));
+    for pose in scene.platforms.iter_mut().flat_map(|platform| &mut platform.poses) {
+        pose.center = (Vector3::from(pose.center) - origin).into();
+    }
+    for (row, shift) in origin.iter().enumerate() {
+        scene.transform[4 * row + 3] = 0.0 - shift;
+    }
+    scene.points = points_from(&model.points, model, &origin, place)?;
     Ok(scene)
 }
 
@@ -84,7 +96,12 @@ fn pose_from(image: &Image) -> mvs::Pose {
     mvs::Pose { rotation, center: center.into() }
 }
 
-fn points_from(points: &Points, model: &Model, place: &Path) -> Result<mvs::PointCloud> {
+fn points_from(
+    points: &Points,
+    model: &Model,
+    origin: &Vector3<f64>,
+    place: &Path,
+) -> Result<mvs::PointCloud> {
     let index_of: HashMap<u32, u32> = model.images.iter().zip(0..).map(|(image, i)| (image.id, i)).collect();
     let mut cloud = mvs::PointCloud::default();
     let mut views = Vec::new();
@@ -101,7 +118,8 @@ fn points_from(points: &Points, model: &Model, place: &Path) -> Result<mvs::Poin
             views.push(index);
         }
         views.sort_unstable();
-        cloud.positions.push(position.map(|v| v as f32));
+        let local = Vector3::from(*position) - origin;
+        cloud.positions.push([local.x as f32, local.y as f32, local.z as f32]);
         cloud.colors.push(points.colors[i]);
         cloud.views.push(&views, &[]);
     }
