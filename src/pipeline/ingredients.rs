@@ -4,7 +4,7 @@ use super::filter::neighbors_of_filter;
 use super::job::FilterJob;
 use super::prepare::Prepared;
 use super::problem::sparse_points;
-use super::skip::skipped;
+use super::skip::{planar, skipped};
 use crate::error::Result;
 use crate::geometry::Camera;
 use crate::scene::{SparsePoint, ViewIndex};
@@ -206,6 +206,7 @@ fn enter_problem(
     let (points, range) = sparse_points(prepared, view, camera);
     let skip = skipped(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref())?;
     let skip: Vec<u8> = skip.iter().flat_map(|skip| skip.data()).map(|&skip| u8::from(skip)).collect();
+    let regions = planar(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref())?;
     let entries = [
         ("image", Digest::of(|d| image(d, view))),
         ("camera or size", Digest::of(|d| enter_camera(d, camera))),
@@ -213,6 +214,7 @@ fn enter_problem(
         ("images of neighbours", source_images.finish()),
         ("sparse points", Digest::of(|d| enter_points(d, &points, range))),
         ("masks or labels", of_bytes(&skip)),
+        ("planar regions", of_text(&format!("{regions:?}"))),
     ];
     from.extend(entries.map(|(name, digest)| (name.to_owned(), digest)));
     Ok(())
