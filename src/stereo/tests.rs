@@ -136,7 +136,7 @@ fn every_cpu_level_and_every_run_gives_the_same_bytes() {
     let (problem, _) = problem(sphere_before_wall, 0);
     let options = StereoOptions::default();
     let first = estimate(&problem, &options, CpuLevel::Scalar).unwrap();
-    for cpu in [CpuLevel::Scalar, CpuLevel::Avx2, CpuLevel::Avx512] {
+    for cpu in [CpuLevel::Scalar, CpuLevel::Neon, CpuLevel::Avx2, CpuLevel::Avx512] {
         if !cpu.is_supported() {
             println!("{}: not on this processor, not compared", cpu.name());
             continue;

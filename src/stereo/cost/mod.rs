@@ -23,8 +23,10 @@ type Baseline = lanes::portable::Sixteen;
 /// Instruction set used by the kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CpuLevel {
-    /// What every processor of the architecture has.
+    /// What every x86-64 processor has; elsewhere plain code.
     Scalar,
+    /// 64-bit ARM.
+    Neon,
     /// x86-64 with AVX2.
     Avx2,
     /// x86-64 with AVX-512 F, BW, DQ, VL, VNNI and VBMI: Ice Lake, Zen 4 and later.
@@ -34,13 +36,17 @@ pub enum CpuLevel {
 impl CpuLevel {
     /// The best level that this processor has.
     pub fn detect() -> Self {
-        [CpuLevel::Avx512, CpuLevel::Avx2].into_iter().find(|l| l.is_supported()).unwrap_or(CpuLevel::Scalar)
+        [CpuLevel::Avx512, CpuLevel::Avx2, CpuLevel::Neon]
+            .into_iter()
+            .find(|l| l.is_supported())
+            .unwrap_or(CpuLevel::Scalar)
     }
 
     /// Whether this processor has the level.
     pub fn is_supported(self) -> bool {
         match self {
             CpuLevel::Scalar => true,
+            CpuLevel::Neon => cfg!(target_arch = "aarch64"),
             #[cfg(target_arch = "x86_64")]
             CpuLevel::Avx2 => std::is_x86_feature_detected!("avx2"),
             #[cfg(target_arch = "x86_64")]
@@ -62,6 +68,7 @@ impl CpuLevel {
     pub fn name(self) -> &'static str {
         match self {
             CpuLevel::Scalar => "scalar",
+            CpuLevel::Neon => "neon",
             CpuLevel::Avx2 => "avx2",
             CpuLevel::Avx512 => "avx512",
         }
@@ -72,9 +79,11 @@ impl std::str::FromStr for CpuLevel {
     type Err = crate::Error;
 
     fn from_str(s: &str) -> crate::Result<Self> {
-        let all = [CpuLevel::Scalar, CpuLevel::Avx2, CpuLevel::Avx512];
+        let all = [CpuLevel::Scalar, CpuLevel::Neon, CpuLevel::Avx2, CpuLevel::Avx512];
         let level = all.into_iter().find(|l| l.name() == s).ok_or_else(|| {
-            crate::Error::invalid(format!("unknown CPU level \"{s}\"; known are scalar, avx2 and avx512"))
+            crate::Error::invalid(format!(
+                "unknown CPU level \"{s}\"; known are scalar, neon, avx2 and avx512"
+            ))
         })?;
         if !level.is_supported() {
             return Err(crate::Error::invalid(format!("this processor does not have CPU level {s}")));
@@ -106,13 +115,20 @@ impl Kernels {
             CpuLevel::Avx2 if level.is_supported() => x86::AVX2,
             #[cfg(target_arch = "x86_64")]
             CpuLevel::Avx512 if level.is_supported() => x86::AVX512,
-            _ => Kernels {
-                prepare: kernels::prepare::<Baseline>,
-                begin: kernels::begin::<Baseline>,
-                survey: kernels::survey::<Baseline>,
-                score_own: kernels::score_own::<Baseline>,
-                try_plane: kernels::try_plane::<Baseline>,
-            },
+            #[cfg(target_arch = "aarch64")]
+            CpuLevel::Neon => Kernels::over::<lanes::neon::Four>(),
+            _ => Kernels::over::<Baseline>(),
+        }
+    }
+
+    /// The kernels over lanes that every processor of the architecture has.
+    fn over<L: lanes::Lanes>() -> Self {
+        Kernels {
+            prepare: kernels::prepare::<L>,
+            begin: kernels::begin::<L>,
+            survey: kernels::survey::<L>,
+            score_own: kernels::score_own::<L>,
+            try_plane: kernels::try_plane::<L>,
         }
     }
 }

@@ -137,6 +137,12 @@ fn wide_registers_give_the_same_bits() {
     }
 }
 
+#[cfg(target_arch = "aarch64")]
+#[test]
+fn neon_gives_the_same_bits() {
+    assert_same::<super::neon::Four>("neon");
+}
+
 #[test]
 fn plain_lanes_compute_what_they_say() {
     assert_same::<Sixteen>("portable");
