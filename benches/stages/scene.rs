@@ -31,6 +31,7 @@ pub(crate) fn problem(maps: &MapsInMemory) -> StereoProblem {
         depth_range: maps.maps[0].estimate.depth_range,
         sparse: Vec::new(),
         skip: None,
+        labels: None,
         regions: Vec::new(),
     }
 }

@@ -21,6 +21,12 @@ pub(crate) struct LabelInput {
     /// Drop these classes: names or ids, separated by commas
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     pub(crate) exclude_classes: Vec<String>,
+    /// What labels decide in estimation [default: skip, when there are labels]
+    #[arg(long, value_name = "MODE", value_enum)]
+    pub(crate) label_estimation: Option<EstimationMode>,
+    /// What a source view that shows another class costs in estimation, 0 to 2, with --label-estimation aware [default: 0.2]
+    #[arg(long, value_name = "COST", allow_negative_numbers = true)]
+    pub(crate) label_cost: Option<f32>,
     /// What labels decide in fusion [default: support, when there are labels]
     #[arg(long, value_name = "MODE", value_enum)]
     pub(crate) label_consistency: Option<ConsistencyMode>,
@@ -33,9 +39,9 @@ pub(crate) struct LabelInput {
     /// Let the K nearest points on the same surface vote on the label of each point once more; 0 = no
     #[arg(long, value_name = "K", default_value_t = 0)]
     pub(crate) label_smooth: u32,
-    /// Whether the filter across views compares pixels of one class only
-    #[arg(long, value_name = "WHETHER", value_enum, default_value_t = OnOff::Off)]
-    pub(crate) label_filter: OnOff,
+    /// Whether the filter across views compares pixels of one class only [default: off; on with --label-estimation aware]
+    #[arg(long, value_name = "WHETHER", value_enum)]
+    pub(crate) label_filter: Option<OnOff>,
     /// A view without a label map
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = WhenMissing::Error)]
     pub(crate) missing_labels: WhenMissing,
@@ -88,6 +94,17 @@ pub(crate) struct LabelOptions {
     pub(crate) input: LabelInput,
     #[command(flatten)]
     pub(crate) output: LabelOutput,
+}
+
+/// `--label-estimation`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EstimationMode {
+    /// nothing: every pixel is estimated
+    Off,
+    /// pixels of unwanted classes are not estimated
+    Skip,
+    /// that, and depths do not spread across class borders
+    Aware,
 }
 
 /// `--label-consistency`.

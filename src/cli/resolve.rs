@@ -2,7 +2,8 @@
 
 use super::dense_config::{self, DenseConfig};
 use super::label_options::{
-    CloudForms, ConsistencyMode, LabelInput, OnOff, PlyLayout as TypedLayout, VotersMode, WhenMissing,
+    CloudForms, ConsistencyMode, EstimationMode, LabelInput, OnOff, PlyLayout as TypedLayout, VotersMode,
+    WhenMissing,
 };
 use super::options::{FilterKind, SharedOptions};
 use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
@@ -12,7 +13,7 @@ use crate::pipeline::{
     AcrossViews, FilterJob, LabelJob, MaskJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork,
 };
 use crate::scene::{NeighborOptions, OutsideRoi, PairingOptions, ResolutionOptions, RoiEstimation};
-use crate::semantics::{ClassRules, Consistency, Voters};
+use crate::semantics::{ClassRules, Consistency, LabelEstimation, Voters};
 use crate::stereo::{CpuLevel, Quality, StereoOptions};
 use crate::store::cloud::PlyLayout;
 use crate::store::labels::{LabelSources, MissingLabels, UnknownLabel};
@@ -240,6 +241,13 @@ pub(crate) fn rules(typed: &LabelInput) -> ClassRules {
     ClassRules {
         classes: names(&typed.classes),
         exclude: names(&typed.exclude_classes),
+        estimation: match typed.label_estimation {
+            Some(EstimationMode::Off) => LabelEstimation::Off,
+            Some(EstimationMode::Skip) | None => LabelEstimation::Skip,
+            Some(EstimationMode::Aware) => {
+                LabelEstimation::Aware { cost: typed.label_cost.unwrap_or(LabelEstimation::DEFAULT_COST) }
+            }
+        },
         consistency: match typed.label_consistency {
             Some(ConsistencyMode::Off) => Consistency::Off,
             Some(ConsistencyMode::Strict) => Consistency::Strict,
@@ -251,7 +259,10 @@ pub(crate) fn rules(typed: &LabelInput) -> ClassRules {
             Some(VotersMode::All) | None => Voters::All,
         },
         smooth: typed.label_smooth,
-        filter: typed.label_filter == OnOff::On,
+        filter: match typed.label_filter {
+            Some(filter) => filter == OnOff::On,
+            None => typed.label_estimation == Some(EstimationMode::Aware),
+        },
     }
 }
 
@@ -271,6 +282,14 @@ pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Re
         unknown: unknown(typed.unknown_label),
         missing: missing(typed.missing_labels),
     };
+    if let Some(cost) = typed.label_cost {
+        if !(0.0..=2.0).contains(&cost) {
+            return Err(Error::invalid(format!("--label-cost {cost}: give a cost of 0 to 2")));
+        }
+        if has_labels(typed) && typed.label_estimation != Some(EstimationMode::Aware) {
+            return Err(Error::invalid("--label-cost needs --label-estimation aware"));
+        }
+    }
     let rules = rules(typed);
     if has_labels(typed) {
         return Ok(Some(LabelJob { sources, rules }));
@@ -282,7 +301,9 @@ pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Re
         (typed.label_border > 0, "--label-border"),
         (typed.label_votes.is_some(), "--label-votes"),
         (typed.label_smooth > 0, "--label-smooth"),
-        (typed.label_filter == OnOff::On, "--label-filter"),
+        (typed.label_filter == Some(OnOff::On), "--label-filter"),
+        (typed.label_estimation.is_some(), "--label-estimation"),
+        (typed.label_cost.is_some(), "--label-cost"),
     ];
     match asked.iter().find(|(asked, _)| *asked) {
         Some((_, option)) => Err(Error::invalid(format!("{option} needs labels: {NEEDED}"))),

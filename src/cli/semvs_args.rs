@@ -141,6 +141,8 @@ const NOT_FOR_FUSE: &[&str] = &[
     "fusion_mode",
     "postprocess_dmaps",
     "label_filter",
+    "label_estimation",
+    "label_cost",
     "filter",
     "remove_dmaps",
     "force",
@@ -184,8 +186,15 @@ pub(crate) struct ConvertArgs {
 }
 
 /// Label options that say how labels restrict fusion; refused where nothing is fused.
-const NOT_FOR_CONVERT: &[&str] =
-    &["label_consistency", "label_border", "label_votes", "label_smooth", "label_filter"];
+const NOT_FOR_CONVERT: &[&str] = &[
+    "label_estimation",
+    "label_cost",
+    "label_consistency",
+    "label_border",
+    "label_votes",
+    "label_smooth",
+    "label_filter",
+];
 
 const CONVERT_EXAMPLES: &str = "\
 Examples:

@@ -3,9 +3,10 @@
 use super::prepare::Prepared;
 use super::skip::{planar, skipped};
 use crate::error::{Error, Result};
-use crate::geometry::Camera;
-use crate::scene::{ImageId, Neighbor, SparseInit, SparsePoint, ViewIndex, resize_gray};
-use crate::stereo::{SourceImage, StereoProblem};
+use crate::geometry::{Camera, Size};
+use crate::scene::{ImageId, LabelMap, Neighbor, SparseInit, SparsePoint, ViewIndex, resize_gray};
+use crate::semantics::LabelEstimation;
+use crate::stereo::{ProblemLabels, SourceImage, StereoProblem};
 use std::sync::Arc;
 
 /// Depths searched beyond those of the sparse points: below the nearest, above the farthest.
@@ -24,6 +25,7 @@ pub(super) fn stereo_problem(prepared: &Prepared, view: ViewIndex) -> Result<Ste
         neighbors.iter().map(|n| source_image(prepared, n)).collect::<Result<Vec<SourceImage>>>()?;
     let (sparse, depth_range) = sparse_points(prepared, view, camera);
     let skip = skipped(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref())?;
+    let labels = labels_of(prepared, view, camera, &sources)?;
     Ok(StereoProblem {
         reference: SourceImage {
             gray: prepared.images.gray(view, camera.size())?,
@@ -35,8 +37,31 @@ pub(super) fn stereo_problem(prepared: &Prepared, view: ViewIndex) -> Result<Ste
         depth_range,
         sparse,
         skip,
+        labels,
         regions: planar(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref())?,
     })
+}
+
+/// The classes that the estimator heeds, if it is to.
+fn labels_of(
+    prepared: &Prepared,
+    view: ViewIndex,
+    camera: &Camera,
+    sources: &[SourceImage],
+) -> Result<Option<ProblemLabels>> {
+    let Some(labels) = &prepared.labels else { return Ok(None) };
+    let LabelEstimation::Aware { cost } = labels.rules().estimation else { return Ok(None) };
+    let map = |view: ViewIndex, size: Size| -> Result<Arc<LabelMap>> {
+        let (map, checked) = labels.maps(view, size)?;
+        Ok(checked.unwrap_or(map))
+    };
+    let neighbors = prepared.neighbors[view.index()].matching();
+    let of_sources = neighbors.iter().zip(sources).map(|(n, source)| map(n.view, source.gray.size()));
+    Ok(Some(ProblemLabels {
+        reference: map(view, camera.size())?,
+        sources: of_sources.collect::<Result<_>>()?,
+        cost,
+    }))
 }
 
 /// The image of a neighbour, resized to the reference's footprint when the two differ much.

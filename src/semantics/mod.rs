@@ -17,7 +17,7 @@ mod vote;
 pub use classes::{Class, ClassId, ClassTable};
 pub use consensus::{Consensus, ConsensusOptions, Witness, border_distance, label_consensus};
 pub use label_map::{nearest_labels, void_borders};
-pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency, Voters};
+pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency, LabelEstimation, Voters};
 pub use regions::{PlanarRegion, PlanePrior, planar_regions};
 pub use render::{LabelledSurface, point_radii, render_labels};
 pub use smooth::smooth_labels;

@@ -46,6 +46,36 @@ impl Voters {
     }
 }
 
+/// What labels decide while depths are estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum LabelEstimation {
+    /// Nothing: every pixel is estimated.
+    Off,
+    /// Pixels of classes that are not wanted are not estimated.
+    #[default]
+    Skip,
+    /// That, and hypotheses do not spread across class borders; a source view that shows another class at a hypothesis costs
+    /// `cost` more, 0..=2.
+    Aware {
+        /// The penalty, on the 0 (best) .. 2 (worst) scale.
+        cost: f32,
+    },
+}
+
+impl LabelEstimation {
+    /// Penalty of [`LabelEstimation::Aware`] unless another is given.
+    pub const DEFAULT_COST: f32 = 0.2;
+
+    /// As the command line spells it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            LabelEstimation::Off => "off",
+            LabelEstimation::Skip => "skip",
+            LabelEstimation::Aware { .. } => "aware",
+        }
+    }
+}
+
 /// Which classes are wanted and how strictly labels are compared, as the user asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClassRules {
@@ -53,6 +83,8 @@ pub struct ClassRules {
     pub classes: Vec<String>,
     /// Names or ids of classes to drop.
     pub exclude: Vec<String>,
+    /// What labels decide in estimation. Default: [`LabelEstimation::Skip`].
+    pub estimation: LabelEstimation,
     /// How labels restrict fusion. Default: [`Consistency::Support`].
     pub consistency: Consistency,
     /// Width in depth-map pixels of the band along class borders that counts as void in the check. Default: 0.
@@ -87,6 +119,7 @@ pub struct ClassPolicy {
     /// Classes whose pixels are drawn towards planes.
     planar: Vec<(ClassId, PlanePrior)>,
     others_kept: bool,
+    others_estimated: bool,
     consistency: Consistency,
     border: u32,
 }
@@ -99,6 +132,7 @@ impl Default for ClassPolicy {
             without_surface: Vec::new(),
             planar: Vec::new(),
             others_kept: true,
+            others_estimated: true,
             consistency: Consistency::Off,
             border: 0,
         }
@@ -128,9 +162,9 @@ impl ClassPolicy {
         };
         let ids = || (0..=last.0).map(ClassId);
         let kept: Vec<bool> = ids().map(keeps).collect();
-        let estimated =
-            ids().map(|id| table.get(id).and_then(|c| c.estimate).unwrap_or(kept[usize::from(id.0)]));
-        let estimated = estimated.collect();
+        let all = rules.estimation == LabelEstimation::Off;
+        let wants = |id| table.get(id).and_then(|c| c.estimate).unwrap_or(kept[usize::from(id.0)]);
+        let estimated = ids().map(|id| all || wants(id)).collect();
         let listed = ids().any(|id| table.contains(id) && kept[usize::from(id.0)]);
         if !listed && !others_kept {
             return Err(crate::Error::invalid(
@@ -142,14 +176,25 @@ impl ClassPolicy {
         let without_surface = without_surface.filter(|id| !is_surface(id)).collect();
         let planar = table.classes().iter().filter_map(|class| Some((class.id, class.plane?))).collect();
         let (consistency, border) = (rules.consistency, rules.border);
-        Ok(ClassPolicy { kept, estimated, without_surface, planar, others_kept, consistency, border })
+        let others_estimated = all || others_kept;
+        Ok(ClassPolicy {
+            kept,
+            estimated,
+            without_surface,
+            planar,
+            others_kept,
+            others_estimated,
+            consistency,
+            border,
+        })
     }
 
     /// The same, but `id` is neither kept nor estimated.
     pub fn dropping(mut self, id: ClassId) -> Self {
         let i = usize::from(id.0);
-        for wanted in [&mut self.kept, &mut self.estimated] {
-            wanted.resize(wanted.len().max(i + 1), self.others_kept);
+        let both = [(&mut self.kept, self.others_kept), (&mut self.estimated, self.others_estimated)];
+        for (wanted, others) in both {
+            wanted.resize(wanted.len().max(i + 1), others);
             wanted[i] = false;
         }
         self
@@ -171,7 +216,7 @@ impl ClassPolicy {
     /// Whether depths of pixels of this class are worth estimating.
     #[inline]
     pub fn is_estimated(&self, id: impl Into<ClassId>) -> bool {
-        self.estimated.get(usize::from(id.into().0)).copied().unwrap_or(self.others_kept)
+        self.estimated.get(usize::from(id.into().0)).copied().unwrap_or(self.others_estimated)
     }
 
     /// Whether two pixels may be one point as far as their labels go; always with [`Consistency::Off`].
@@ -291,6 +336,20 @@ mod tests {
         let policy = ClassPolicy::new(&table, &rules).unwrap();
         assert_eq!(kept(&policy, 0..=4), [2]);
         assert!(policy.is_estimated(2) && policy.is_estimated(3) && !policy.is_estimated(1));
+    }
+
+    #[test]
+    fn everything_is_estimated_where_labels_decide_nothing_there() {
+        let rules = ClassRules {
+            classes: vec!["door".into()],
+            estimation: LabelEstimation::Off,
+            ..ClassRules::default()
+        };
+        let policy = ClassPolicy::new(&ClassTable::builtin("3dom-facade").unwrap(), &rules).unwrap();
+        assert_eq!(kept(&policy, 0..=u16::MAX), [5]);
+        assert!((0..=u16::MAX).all(|id| policy.is_estimated(id)));
+        let masked = policy.dropping(ClassId(9));
+        assert!(!masked.is_estimated(9) && masked.is_estimated(7) && !masked.is_kept(7));
     }
 
     #[test]

@@ -66,14 +66,14 @@ pub(crate) fn spread(first: usize, k: usize) -> usize {
     (first + k * CELL_STEP) % CELLS
 }
 
-/// The best of four pixels drawn beside the tile on side `k % 4`, as a plane at the tile's centre.
+/// The best of four pixels drawn beside the tile on side `k % 4`, as a plane at the tile's centre, and its class.
 pub(crate) fn beside(
     level: &Level,
     state: &State,
     tile: &Tile,
     k: usize,
     rng: &mut Rng,
-) -> Option<InversePlane> {
+) -> Option<(InversePlane, u32)> {
     let reach = if k < 4 { 6 } else { 24 };
     let (tw, th) = (TILE_W as i32, TILE_H as i32);
     let mut best: Option<(i32, i32, f32)> = None;
@@ -97,7 +97,9 @@ pub(crate) fn beside(
     }
     best.map(|(x, y, _)| {
         let (cx, cy) = (tile.x0 as f32 + CENTRE.0, tile.y0 as f32 + CENTRE.1);
-        state.plane(state.at(x, y)).moved(cx - x as f32, cy - y as f32)
+        let plane = state.plane(state.at(x, y)).moved(cx - x as f32, cy - y as f32);
+        let class = level.labels.as_ref().map_or(0, |labels| u32::from(labels[(x as usize, y as usize)]));
+        (plane, class)
     })
 }
 

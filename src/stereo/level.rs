@@ -5,7 +5,8 @@ use super::problem::{SourceImage, StereoProblem};
 use super::tile::{REACH, TILE_W, WIN_W};
 use crate::geometry::{Camera, Size};
 use crate::scene::resize_gray;
-use crate::scene::{DepthEstimate, GrayImage};
+use crate::scene::{DepthEstimate, GrayImage, LabelMap};
+use crate::semantics::nearest_labels;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
@@ -58,6 +59,8 @@ pub(crate) struct Source {
     /// Homogeneous source pixel = `a · (x, y, 1) + b · w`.
     pub(crate) a: [[f32; 3]; 3],
     pub(crate) b: [f32; 3],
+    /// Class of every pixel, if labels are heeded.
+    pub(crate) labels: Option<Vec<u32>>,
     /// Planes of the source's own depth map, if the geometric term is on.
     pub(crate) geometry: Option<SourceGeometry>,
 }
@@ -89,6 +92,10 @@ pub(crate) struct Level {
     pub(crate) weighting: Weighting,
     /// Weight of the geometric term.
     pub(crate) geometric_weight: f32,
+    /// Classes of the reference, if labels are heeded.
+    pub(crate) labels: Option<LabelMap>,
+    /// What a source costs more where it shows another class.
+    pub(crate) label_cost: f32,
 }
 
 /// Falloffs of a texel's bilateral weight e⁻ˣ (Yoon & Kweon 2006) in a matching window: `x = grey · Δg² + space · Δp²`,
@@ -123,7 +130,8 @@ impl Level {
         let sources = problem
             .sources
             .iter()
-            .map(|s| {
+            .enumerate()
+            .map(|(i, s)| {
                 let (gray, source_camera) = shrunk(s, halvings);
                 let (a, b) = transfer(&camera, &source_camera);
                 pixels_per_w = pixels_per_w.max(shift_per_w(&a, &b, camera.size(), w_mid));
@@ -135,6 +143,7 @@ impl Level {
                     bytes,
                     a: rows_f32(&a),
                     b: [b.x as f32, b.y as f32, b.z as f32],
+                    labels: problem.labels.as_ref().and_then(|l| ids(l.sources.get(i)?, gray.size())),
                     geometry: None,
                 }
             })
@@ -147,6 +156,8 @@ impl Level {
             w_range,
             pixels_per_w: pixels_per_w.max(f32::MIN_POSITIVE),
             geometric_weight: 0.0,
+            labels: problem.labels.as_ref().map(|l| nearest_labels(&l.reference, camera.size())),
+            label_cost: problem.labels.as_ref().map_or(0.0, |l| l.cost),
             weighting: Weighting::SEARCH,
         }
     }
@@ -165,6 +176,12 @@ impl Level {
         }
         self
     }
+}
+
+/// The classes of `labels` at `size`; `None` if there are none.
+fn ids(labels: &LabelMap, size: Size) -> Option<Vec<u32>> {
+    let labels = nearest_labels(labels, size);
+    (size.area() > 0).then(|| labels.data().iter().map(|&id| u32::from(id)).collect())
 }
 
 /// Image and camera divided by `2^halvings`.

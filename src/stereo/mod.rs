@@ -22,7 +22,7 @@ mod tile;
 
 pub use cost::CpuLevel;
 pub use options::{Quality, StereoOptions};
-pub use problem::{SourceImage, SparsePoint, StereoProblem};
+pub use problem::{ProblemLabels, SourceImage, SparsePoint, StereoProblem};
 
 use crate::scene::DepthEstimate;
 use crate::{Error, Result};

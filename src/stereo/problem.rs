@@ -2,7 +2,7 @@
 
 use crate::geometry::Camera;
 pub use crate::scene::SparsePoint;
-use crate::scene::{GrayImage, Grid, ImageId};
+use crate::scene::{GrayImage, Grid, ImageId, LabelMap};
 use crate::semantics::PlanarRegion;
 use std::sync::Arc;
 
@@ -15,6 +15,17 @@ pub struct SourceImage {
     pub camera: Camera,
     /// Global ID of the view.
     pub id: ImageId,
+}
+
+/// The classes of the pixels of all views of a problem; 0 is of any class.
+#[derive(Clone, Debug)]
+pub struct ProblemLabels {
+    /// Of the reference, at its image's size.
+    pub reference: Arc<LabelMap>,
+    /// Of every source, at its image's size.
+    pub sources: Vec<Arc<LabelMap>>,
+    /// What a source costs more at a pixel where it shows another class, 0..=2.
+    pub cost: f32,
 }
 
 /// One reference view, the source views it is matched with, and what is known beforehand.
@@ -32,6 +43,8 @@ pub struct StereoProblem {
     pub sparse: Vec<SparsePoint>,
     /// Pixels that get no depth (masked, or of a class that is not estimated).
     pub skip: Option<Grid<bool>>,
+    /// Classes that hypotheses and matches heed.
+    pub labels: Option<ProblemLabels>,
     /// Regions of the reference whose pixels are drawn towards planes.
     pub regions: Vec<PlanarRegion>,
 }

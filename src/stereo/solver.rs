@@ -63,7 +63,8 @@ pub(crate) struct Solver<'a> {
     pub(crate) seed: u64,
     pub(crate) view: u32,
     tile: Box<Tile>,
-    tried: Vec<[f32; 4]>,
+    /// Planes tried at this visit, at the tile's corners, and the class they were tried on.
+    tried: Vec<([f32; 4], u32)>,
 }
 
 impl<'a> Solver<'a> {
@@ -103,8 +104,8 @@ impl<'a> Solver<'a> {
         let first = rng.below(CELLS);
         self.try_own(pass, first, ranked);
         for k in 0..pass.candidates {
-            if let Some(p) = candidates::beside(self.level, state, &self.tile, k, rng) {
-                self.offer(p, SAME_SURFACE);
+            if let Some((p, class)) = candidates::beside(self.level, state, &self.tile, k, rng) {
+                self.offer(p, class, SAME_SURFACE);
             }
         }
         let cost = self.mean_cost();
@@ -152,7 +153,7 @@ impl<'a> Solver<'a> {
             if let Some((x, y, cost)) = candidates::best_of_cell(&self.tile, candidates::spread(first, k))
                 && cost < 1.5
             {
-                self.offer(self.tile.plane_at(x, y), SAME_PLANE);
+                self.offer(self.tile.plane_at(x, y), self.tile.classes[y][x], SAME_PLANE);
             }
             if !ranked {
                 self.tile.rank_views();
@@ -172,7 +173,7 @@ impl<'a> Solver<'a> {
         let halvings = (k % 3) as i32 + pass.iteration as i32;
         let strength = if cost > 0.6 { 1.0 } else { 0.5f32.powi(halvings) };
         let p = candidates::shaken(self.level, &self.tile, x, y, strength, rng);
-        (self.kernels.try_plane)(&mut self.tile, self.level, p);
+        self.try_on(p, self.tile.classes[y][x]);
     }
 
     fn fit(&mut self, first: usize, k: usize) {
@@ -183,21 +184,38 @@ impl<'a> Solver<'a> {
         if cost <= 1.0
             && let Some(p) = candidates::fitted(self.level, &self.tile, x, y, radius)
         {
-            self.offer(p, SAME_PLANE);
+            self.offer(p, self.tile.classes[y][x], SAME_PLANE);
         }
     }
 
     /// Tries a plane unless one within `same` pixels of shift was tried at this visit.
-    fn offer(&mut self, p: InversePlane, same: f32) {
+    fn offer(&mut self, p: InversePlane, class: u32, same: f32) {
         let same = same / self.level.pixels_per_w;
         let (cx, cy) = CENTRE;
         let corners = [(-cx, -cy), (cx, -cy), (-cx, cy), (cx, cy)].map(|(dx, dy)| p.moved(dx, dy).w);
-        let known = |t: &[f32; 4]| t.iter().zip(&corners).all(|(a, b)| (a - b).abs() < same);
+        let known = |(t, of): &([f32; 4], u32)| {
+            *of == class && t.iter().zip(&corners).all(|(a, b)| (a - b).abs() < same)
+        };
         if self.tried.iter().any(known) {
             return;
         }
-        self.tried.push(corners);
+        self.tried.push((corners, class));
+        self.try_on(p, class);
+    }
+
+    /// Tries a plane on the pixels of `class` and on those without class; on all if it is 0.
+    fn try_on(&mut self, p: InversePlane, class: u32) {
+        if class == 0 {
+            (self.kernels.try_plane)(&mut self.tile, self.level, p);
+            return;
+        }
+        let active = self.tile.belief.active;
+        let classes = self.tile.classes.as_flattened();
+        for (active, &of) in self.tile.belief.active.as_flattened_mut().iter_mut().zip(classes) {
+            *active *= if of == class || of == 0 { 1.0 } else { 0.0 };
+        }
         (self.kernels.try_plane)(&mut self.tile, self.level, p);
+        self.tile.belief.active = active;
     }
 
     fn mean_cost(&self) -> f32 {

@@ -89,6 +89,7 @@ pub(in crate::stereo) fn problem(surface: Surface, reference: usize) -> (StereoP
         depth_range: (2.0, 9.0),
         sparse: Vec::new(),
         skip: None,
+        labels: None,
         regions: Vec::new(),
     };
     (problem, depth)

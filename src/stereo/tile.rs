@@ -135,6 +135,8 @@ pub(crate) struct Tile {
     pub(crate) x0: i32,
     /// Row of the first pixel; may be negative.
     pub(crate) y0: i32,
+    /// Class of every pixel, if labels are heeded; else, and for void, 0.
+    pub(crate) classes: [Words; TILE_H],
     pub(crate) patch: Patch,
     pub(crate) belief: Belief,
     pub(crate) halo: Halo,
@@ -159,6 +161,7 @@ impl Tile {
         Box::new(Tile {
             x0: 0,
             y0: 0,
+            classes: [[0; TILE_W]; TILE_H],
             patch: Patch {
                 texel: ZERO_WIN,
                 pairs: ZERO_WORDS,
@@ -224,6 +227,15 @@ impl Tile {
         for (r, row) in self.patch.texel.iter_mut().enumerate() {
             let (x, y) = (x0 - REACH as i32, y0 - REACH as i32 + r as i32);
             row.copy_from_slice(level.reference.window(x, y, WIN_W));
+        }
+        if let Some(labels) = &level.labels {
+            for (y, row) in self.classes.iter_mut().enumerate() {
+                for (x, class) in row.iter_mut().enumerate() {
+                    let (px, py) = (x0 + x as i32, y0 + y as i32);
+                    let id = usize::try_from(px).ok().zip(usize::try_from(py).ok());
+                    *class = id.and_then(|(x, y)| labels.get(x, y)).map_or(0, |&id| u32::from(id));
+                }
+            }
         }
         let b = &mut self.belief;
         for y in 0..TILE_H {

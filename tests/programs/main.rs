@@ -13,6 +13,7 @@ mod compare;
 mod corners;
 mod exact_runs;
 mod exchange;
+mod label_estimation;
 mod labels;
 mod masks;
 mod odd_inputs;

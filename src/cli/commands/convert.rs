@@ -17,7 +17,9 @@ pub(crate) fn convert(args: &ConvertArgs, progress: &Progress) -> Result<()> {
         (args.labels.label_border > 0, "--label-border"),
         (args.labels.label_votes.is_some(), "--label-votes"),
         (args.labels.label_smooth > 0, "--label-smooth"),
-        (args.labels.label_filter == OnOff::On, "--label-filter"),
+        (args.labels.label_filter == Some(OnOff::On), "--label-filter"),
+        (args.labels.label_estimation.is_some(), "--label-estimation"),
+        (args.labels.label_cost.is_some(), "--label-cost"),
     ];
     if let Some((_, option)) = asked.iter().find(|(asked, _)| *asked) {
         return Err(Error::invalid(format!(

@@ -2,6 +2,7 @@
 
 use crate::fusion::FusionOptions;
 use crate::pipeline::{AcrossViews, FilterJob, Outputs, SceneJob};
+use crate::semantics::LabelEstimation;
 use crate::store::cloud::PlyLayout;
 use clap::{ArgMatches, Args, Command};
 use serde_json::{Map, Value};
@@ -62,6 +63,11 @@ pub(crate) fn resolve(
     ];
     meant.extend(depth_maps.map(|folder| ("depth-maps", path(folder))));
     if let Some(labels) = &input.labels {
+        meant.push(("label-estimation", labels.rules.estimation.name().into()));
+        if let LabelEstimation::Aware { cost } = labels.rules.estimation {
+            meant.push(("label-cost", f64::from(cost).into()));
+        }
+        meant.push(("label-filter", if labels.rules.filter { "on" } else { "off" }.into()));
         meant.push(("label-consistency", labels.rules.consistency.name().into()));
         meant.push(("label-votes", labels.rules.voters.name().into()));
     }

@@ -137,6 +137,8 @@ pub(crate) const BEYOND: &[&str] = &[
     "class-table",
     "classes",
     "exclude-classes",
+    "label-estimation",
+    "label-cost",
     "label-consistency",
     "label-border",
     "label-votes",

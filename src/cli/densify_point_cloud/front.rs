@@ -169,6 +169,7 @@ mod tests {
                     "label-votes" => "merged".into(),
                     "label-filter" => "on".into(),
                     "max-memory" => "4G".into(),
+                    "label-estimation" => "aware".into(),
                     "offset" => "1,-2,3".into(),
                     _ => "1".into(),
                 });

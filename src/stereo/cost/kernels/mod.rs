@@ -3,6 +3,7 @@
 mod contest;
 mod correlation;
 mod geometric;
+mod label;
 mod own;
 mod patch;
 mod smoothness;
@@ -17,6 +18,7 @@ use crate::stereo::level::Level;
 use crate::stereo::plane::InversePlane;
 use crate::stereo::tile::{CENTRE, REACH, ROBUST_COST, Row, TILE_H, TILE_W, Tile, TileMap, UNSEEN, WinRow};
 use geometric::geometric_term;
+use label::label_term;
 use warp::{Coverage, warp};
 
 const ZERO: Row = [0.0; TILE_W];
@@ -57,7 +59,7 @@ pub(super) fn survey<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePla
 /// it.
 #[inline(always)]
 fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> bool {
-    let Tile { x0, y0, patch, scratch, order, views, view_cost, .. } = tile;
+    let Tile { x0, y0, classes, patch, scratch, order, views, view_cost, .. } = tile;
     scratch.best = [[UNSEEN; TILE_W]; TILE_H];
     scratch.second = [[UNSEEN; TILE_W]; TILE_H];
     let mut any = false;
@@ -84,6 +86,16 @@ fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> b
                     let cost = L::load(row);
                     L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost).store(row);
                 }
+            }
+        }
+        if let Some(labels) = &source.labels {
+            for y in 0..TILE_H {
+                let column = L::load(&LANE) - L::splat(CENTRE.0);
+                let w = L::splat(plane.w + plane.wy * (y as f32 - CENTRE.1)) + L::splat(plane.wx) * column;
+                let at = (*x0 as f32, (*y0 + y as i32) as f32);
+                let term = label_term(source, labels, (classes, y), at, w, level.label_cost);
+                let cost = L::load(&scratch.cost[y]);
+                L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost).store(&mut scratch.cost[y]);
             }
         }
         let mut sum = L::splat(0.0);

@@ -2,6 +2,7 @@
 
 use super::correlation::{SumRows, finish, merged, of_samples};
 use super::geometric::geometric_term;
+use super::label::label_term;
 use super::warp::{FIXED, MIN_DEPTH_RATIO, clamped, texels};
 use super::{LANE, Lanes};
 use crate::stereo::level::{Level, Source};
@@ -12,7 +13,7 @@ use crate::stereo::tile::{
 /// Matching cost of every pixel's own plane over the views in use.
 #[inline(always)]
 pub(in crate::stereo::cost) fn score_own<L: Lanes>(tile: &mut Tile, level: &Level) {
-    let Tile { x0, y0, patch, belief, order, views, .. } = tile;
+    let Tile { x0, y0, classes, patch, belief, order, views, .. } = tile;
     for y in 0..TILE_H {
         let at = (*x0 as f32, (*y0 + y as i32) as f32);
         let planes = [L::load(&belief.w[y]), L::load(&belief.wx[y]), L::load(&belief.wy[y])];
@@ -25,6 +26,10 @@ pub(in crate::stereo::cost) fn score_own<L: Lanes>(tile: &mut Tile, level: &Leve
             let mut cost = of_row(patch, source, at, planes, y);
             if let Some(g) = &source.geometry {
                 let term = geometric_term(g, at, planes[0], level.geometric_weight);
+                cost = L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost);
+            }
+            if let Some(labels) = &source.labels {
+                let term = label_term(source, labels, (classes, y), at, planes[0], level.label_cost);
                 cost = L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost);
             }
             let (b, s) = (L::load(&best), L::load(&second));
