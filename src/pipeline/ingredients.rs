@@ -4,10 +4,11 @@ use super::filter::neighbors_of_filter;
 use super::job::FilterJob;
 use super::prepare::Prepared;
 use super::problem::sparse_points;
-use super::skip::{planar, skipped};
+use super::skip::{Labels, planar, skipped};
 use crate::error::Result;
 use crate::geometry::Camera;
 use crate::scene::{SparsePoint, ViewIndex};
+use crate::semantics::LabelEstimation;
 use crate::stereo::StereoOptions;
 use crate::store::digest::{Digest, Digester};
 use rayon::prelude::*;
@@ -217,6 +218,16 @@ fn enter_problem(
         ("planar regions", of_text(&format!("{regions:?}"))),
     ];
     from.extend(entries.map(|(name, digest)| (name.to_owned(), digest)));
+    if let Some(labels) = &prepared.labels
+        && let LabelEstimation::Aware { cost } = labels.rules().estimation
+    {
+        let mut digester = Digester::new();
+        digester.number(u64::from(cost.to_bits()));
+        for view in std::iter::once(view).chain(neighbors.iter().map(|n| n.view)) {
+            enter_labels(&mut digester, prepared, labels, view)?;
+        }
+        from.insert("classes of pixels".to_owned(), digester.finish());
+    }
     Ok(())
 }
 
@@ -231,12 +242,18 @@ fn enter_filter(recipe: Recipe<'_>, view: ViewIndex, from: &mut BTreeMap<String,
         let everyone: Vec<ViewIndex> = prepared.views().collect();
         let others = neighbors_of_filter(prepared, view, across, &everyone);
         for view in std::iter::once(view).chain(others) {
-            let (map, checked) = labels.maps(view, prepared.camera(view)?.size())?;
-            let ids: Vec<u8> = checked.unwrap_or(map).data().iter().flat_map(|id| id.to_le_bytes()).collect();
-            digester.bytes(&ids);
+            enter_labels(&mut digester, prepared, labels, view)?;
         }
     }
     from.insert(FILTER.to_owned(), digester.finish());
+    Ok(())
+}
+
+/// Enters the classes of a view's pixels as they are compared.
+fn enter_labels(d: &mut Digester, prepared: &Prepared, labels: &Labels, view: ViewIndex) -> Result<()> {
+    let (map, checked) = labels.maps(view, prepared.camera(view)?.size())?;
+    let ids: Vec<u8> = checked.unwrap_or(map).data().iter().flat_map(|id| id.to_le_bytes()).collect();
+    d.bytes(&ids);
     Ok(())
 }
 
