@@ -27,6 +27,7 @@ use crate::store::cameras::working_cameras;
 use crate::store::cloud::PlyLayout;
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::import::LoadedScene;
+use crate::store::space;
 use crate::store::stored_cloud::StoredCloud;
 use crate::store::work_folder::{FolderLock, sweep};
 use nalgebra::Vector3;
@@ -76,6 +77,7 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
     if lock.is_none() && plan.has_work() {
         lock = Some(FolderLock::take(&job.depth_maps)?);
     }
+    space::require(&job.depth_maps, plan.disk_bytes(&prepared), "the depth maps that are to be made")?;
     let maps = name_unmatched(&mut prepared, &plan.given, job.input.strict, progress)?;
     let fusion = match job.depth_maps_only {
         true => job.fusion,

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::report::{RunReport, StageTime, ViewReport};
 use crate::scene::ViewIndex;
 use crate::store::depth_store::DepthStore;
+use crate::store::memory;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -46,6 +47,7 @@ impl Clock {
         report.seconds = self.start.elapsed().as_secs_f64();
         report.cpu_seconds = difference(cpu_seconds(), self.cpu_start);
         report.stages = self.stages;
+        report.peak_memory_bytes = memory::peak();
     }
 }
 

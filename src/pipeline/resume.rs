@@ -1,6 +1,7 @@
 //! What of a run is there already, and what is to be made.
 
 use super::ingredients::{Ingredients, Recipe, ingredients};
+use super::memory_plan::MAP_BYTES;
 use super::prepare::Prepared;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -276,6 +277,17 @@ impl Plan {
     /// Whether anything is made.
     pub(super) fn has_work(&self) -> bool {
         self.todo.iter().any(|views| !views.is_empty())
+    }
+
+    /// Bytes that the maps to be made take on the disk at most: those of two stages, as one is made from the other.
+    pub(super) fn disk_bytes(&self, prepared: &Prepared) -> u64 {
+        let bytes_of = |view: &ViewIndex| match &prepared.cameras[view.index()] {
+            Some(camera) => camera.size().area() as u64 * MAP_BYTES,
+            None => 0,
+        };
+        let stages: Vec<u64> = self.todo.iter().map(|views| views.iter().map(bytes_of).sum()).collect();
+        let pairs = stages.windows(2).map(|pair| pair[0] + pair[1]);
+        pairs.chain(stages.first().copied()).max().unwrap_or(0)
     }
 
     /// Views whose maps were there.

@@ -23,6 +23,8 @@ pub struct RunReport {
     pub seconds: f64,
     /// Time of all threads together, seconds; `None` = not measured.
     pub cpu_seconds: Option<f64>,
+    /// Largest resident size of the process so far, bytes; `None` = not known.
+    pub peak_memory_bytes: Option<u64>,
     /// Views of the scene in order.
     pub views: Vec<ViewReport>,
     /// Points of the dense cloud.
@@ -135,6 +137,7 @@ mod tests {
             stages: vec![StageTime { stage: "fusion".into(), seconds: 1.25, cpu_seconds: None }],
             seconds: 12.0,
             cpu_seconds: Some(20.0),
+            peak_memory_bytes: None,
             views: vec![ViewReport { id: 12, depth_range: [1.0, f32::INFINITY], ..ViewReport::default() }],
             points: 12_345,
             classes: vec![ClassRow {

@@ -1,6 +1,7 @@
 //! Outputs that appear whole or not at all.
 
 use super::faults::{self, Access};
+use super::space::with_room;
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
@@ -34,7 +35,8 @@ impl AtomicFile {
             }
             if !metadata.is_file() {
                 let file = File::options().write(true).open(path).map_err(|e| Error::io(path, "write", e))?;
-                let writer = BufWriter::with_capacity(BUFFER, Medium { file, path: path.to_owned() });
+                let writer =
+                    BufWriter::with_capacity(BUFFER, Medium { file, path: path.to_owned(), written: 0 });
                 return Ok(AtomicFile { writer, temporary: None, path: path.to_owned() });
             }
         }
@@ -45,7 +47,7 @@ impl AtomicFile {
         let (file, temporary) = named.into_parts();
         // Tells those who sweep that it is in use; where there are no locks nobody sweeps.
         let _ = file.try_lock();
-        let writer = BufWriter::with_capacity(BUFFER, Medium { file, path: path.to_owned() });
+        let writer = BufWriter::with_capacity(BUFFER, Medium { file, path: path.to_owned(), written: 0 });
         Ok(AtomicFile { writer, temporary: Some(temporary), path: path.to_owned() })
     }
 
@@ -87,6 +89,7 @@ impl AtomicFile {
 struct Medium {
     file: File,
     path: PathBuf,
+    written: u64,
 }
 
 impl Medium {
@@ -98,8 +101,14 @@ impl Medium {
 
 impl Write for Medium {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let length = faults::meet_write(&self.path, bytes.len())?;
-        self.file.write(&bytes[..length])
+        let length = faults::meet_write(&self.path, bytes.len());
+        match length.and_then(|length| self.file.write(&bytes[..length])) {
+            Ok(length) => {
+                self.written += length as u64;
+                Ok(length)
+            }
+            Err(e) => Err(with_room(e, folder_of(&self.path), self.written)),
+        }
     }
     fn flush(&mut self) -> std::io::Result<()> {
         self.file.flush()

@@ -18,6 +18,11 @@ pub(crate) fn allowed(typed: Option<u64>) -> u64 {
     typed.or(default).unwrap_or(u64::MAX >> 1)
 }
 
+/// Largest resident size of this process so far, bytes.
+pub(crate) fn peak() -> Option<u64> {
+    read("/proc/self/status").and_then(|text| field(&text, "VmHWM:")).map(|kib| kib << 10)
+}
+
 /// Environment variable that says how many MiB may be used, less than there are.
 pub(crate) const LIMIT_VARIABLE: &str = "SEMVS_MEMORY_MIB";
 

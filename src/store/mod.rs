@@ -15,6 +15,8 @@ pub(crate) mod digest;
 mod drawing;
 pub mod export;
 pub(crate) mod faults;
+#[cfg(test)]
+mod hostile_image_tests;
 pub mod images;
 pub mod import;
 mod jpeg;
@@ -34,6 +36,7 @@ mod ply_cloud;
 pub(crate) mod ply_source;
 pub mod rasters;
 pub mod reliability_diagram;
+pub(crate) mod space;
 pub mod spool;
 mod stale_clouds;
 pub(crate) mod stored_cloud;

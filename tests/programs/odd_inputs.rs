@@ -168,6 +168,30 @@ fn names_that_are_no_text_cost_their_view_alone() {
 }
 
 #[test]
+fn names_that_climb_are_read_but_never_written_to() {
+    let scratch = changed(|scene| {
+        for image in &mut scene.images {
+            let name = String::from_utf8(image.name.clone()).unwrap();
+            image.name = format!("../{name}").into_bytes();
+        }
+    });
+    std::fs::create_dir(scratch.path("inner")).unwrap();
+    std::fs::rename(scratch.path("scene.mvs"), scratch.path("inner/scene.mvs")).unwrap();
+    let outside = |scratch: &Scratch| {
+        let files = scratch.files().into_iter().filter(|name| !name.starts_with("inner/"));
+        files.map(|name| (scratch.read(&name), name)).collect::<Vec<_>>()
+    };
+    let before = outside(&scratch);
+    let dense = "inner/scene.mvs -o inner/out.ply -w inner";
+    let labels = "--label-path labels --class-table 3dom-facade";
+    scratch.semvs(&format!("densify {dense} {QUICK} {labels}")).ok();
+    scratch.semvs("export inner/scene.mvs --to colmap --depth-maps inner --copy-images -o inner/colmap").ok();
+    scratch.semvs("export inner/depth0000.dmap --to png -o inner/maps").ok();
+    scratch.semvs("labels render inner/scene.mvs --cloud inner/out.ply -w inner -o inner/labels").ok();
+    assert_eq!(outside(&scratch), before);
+}
+
+#[test]
 fn images_of_one_name_are_used_once_for_each_pose() {
     let scratch = changed(|scene| scene.images[1].name = scene.images[0].name.clone());
     let out = densify(&scratch);
