@@ -5,7 +5,7 @@ cd "$(dirname "$0")"
 fixtures=../../compat-fixtures
 small=$fixtures/format-corpus
 sparse=$fixtures/facade6
-for target in interface project dmap ply colmap_sparse colmap_dense rasters text_files; do mkdir -p "corpus/$target"; done
+for target in interface project dmap ply colmap_sparse colmap_dense rasters text_files las; do mkdir -p "corpus/$target"; done
 cp "$small"/mvsi/i*.mvs corpus/interface/
 cp "$small"/native/n*.mvs corpus/project/
 cp "$small"/other/d7.dmap corpus/dmap/

@@ -1,6 +1,6 @@
 //! Fusion of a long line of scenes: memory follows the working set, not the number of views.
 
-use crate::common::{Scratch, facade6};
+use crate::common::Scratch;
 use semvs_formats::Limits;
 use semvs_formats::dmap::DepthMapFile;
 use semvs_formats::mvs::{self, NEWEST_VERSION, Scene};
@@ -8,7 +8,9 @@ use semvs_formats::mvs::{self, NEWEST_VERSION, Scene};
 /// Distance between two copies of the bundled scene.
 const STEP: f64 = 100.0;
 /// Memory for the curve.
-const MEMORY: &str = "160M";
+const MEMORY: &str = "62M";
+/// One of so many sparse points is kept: they are input, and grow with it.
+const SPARSE: usize = 8;
 
 /// `copies` of the bundled scene side by side, with OpenMVS's depth maps.
 fn line(copies: usize) -> Scratch {
@@ -39,7 +41,7 @@ fn line(copies: usize) -> Scratch {
             map.write(&mut bytes).unwrap();
             scratch.write(&format!("maps/depth{id:04}.dmap"), bytes);
         }
-        for (i, position) in one.points.positions.iter().enumerate() {
+        for (i, position) in one.points.positions.iter().enumerate().step_by(SPARSE) {
             all.points.positions.push([position[0] + shift as f32, position[1], position[2]]);
             let seen: Vec<u32> = one.points.views.images_of(i).iter().map(|view| view + views).collect();
             all.points.views.push(&seen, &[]);
@@ -72,7 +74,7 @@ fn memory_of_fusion_does_not_follow_the_number_of_views() {
     let (points, ..) = fuse(&alone, "");
     for copies in [3, 11, 43] {
         let scratch = line(copies);
-        let (all, peak, _) = fuse(&scratch, &format!("--max-memory {MEMORY}"));
+        let (all, peak, _) = fuse(&scratch, &format!("--max-memory {MEMORY} --max-threads 1"));
         let with_more = scratch.read("out.ply");
         let (_, more, seconds) = fuse(&scratch, "--max-threads 2");
         let (_, _, serial) = fuse(&scratch, "--max-threads 1");
@@ -85,7 +87,6 @@ fn memory_of_fusion_does_not_follow_the_number_of_views() {
         assert!(all.abs_diff(copies * points) <= copies * points / 20);
         peaks.push(peak);
     }
-    assert!(facade6().exists());
     if cfg!(target_os = "linux") {
         assert!(peaks[2] <= 1.25 * peaks[1], "{peaks:?}");
     }

@@ -9,10 +9,14 @@ use crate::wire::{Place, Reader, Writer};
 use crate::{Error, Result};
 use std::io::{Read, Write};
 
+/// Bytes that small files may take beyond four times their size.
+const SPARE: u64 = 16 << 20;
+
 /// Reads one file into its part of `model`.
 pub(super) fn read_file<R: Read>(model: &mut Model, file: ModelFile, r: &mut Reader<R>) -> Result<()> {
     if let Some(length) = r.remaining() {
-        r.cap_budget(length.saturating_mul(4));
+        // What is small in the file, such as rigs without sensors, may be larger in memory.
+        r.cap_budget(length.saturating_mul(4).saturating_add(SPARE));
     }
     match file {
         ModelFile::Cameras => model.cameras = read_cameras(r)?,

@@ -135,6 +135,17 @@ fn lines_of_observations_may_be_empty_and_names_may_have_spaces() {
     assert!(error.to_string().contains("white space"), "{error}");
 }
 
+/// Found by fuzzing: they take more memory than four times their bytes.
+#[test]
+fn rigs_without_sensors_come_back_from_both_encodings() {
+    let rig = |id| Rig { id, reference: None, others: Vec::new() };
+    let model = Model { rigs: [9, 2, 3, 9, 4, 5, 6].map(rig).to_vec(), ..Model::default() };
+    for encoding in [Encoding::Binary, Encoding::Text] {
+        let bytes = written(&model, ModelFile::Rigs, encoding);
+        assert_eq!(read(ModelFile::Rigs, encoding, &bytes).unwrap().rigs, model.rigs);
+    }
+}
+
 #[test]
 fn every_prefix_and_every_changed_byte_is_an_error_or_a_model() {
     let model = sample();
