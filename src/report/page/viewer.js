@@ -1,0 +1,238 @@
+"use strict";
+// A point cloud in WebGL 2: orbit, pan, zoom, colours, classes, camera frusta.
+
+const VERTEX = `#version 300 es
+layout(location=0) in vec3 place; layout(location=1) in vec3 rgb; layout(location=2) in vec4 facts; layout(location=3) in vec3 normal;
+uniform mat4 view; uniform vec3 extent; uniform float size, scale; uniform int mode; uniform sampler2D classes;
+out vec3 color;
+vec3 ramp(float t) { return clamp(vec3(sin(3.1*t-1.2)*.9+.15, sin(2.9*t)*.9+.08, cos(3.0*t-.6)*.75+.2), 0., 1.); }
+void main() {
+  vec4 paint = texelFetch(classes, ivec2(int(facts.x + .5), 0), 0);
+  gl_Position = paint.a < .5 ? vec4(2., 2., 2., 1.) : view * vec4(place * extent, 1.);
+  gl_PointSize = clamp(size * scale / max(gl_Position.w, 1e-6), 1., 24.);
+  color = mode == 0 ? rgb : mode == 1 ? paint.rgb : mode == 2 ? ramp(facts.y) : mode == 3 ? ramp(min(facts.z * 255. / 8., 1.)) : normal * .5 + .5;
+}`;
+const FRAGMENT = `#version 300 es
+precision mediump float; in vec3 color; out vec4 result;
+void main() { vec2 p = gl_PointCoord - .5; if (dot(p, p) > .25) discard; result = vec4(color, 1.); }`;
+const LINE_VERTEX = `#version 300 es
+layout(location=0) in vec3 place; uniform mat4 view; void main() { gl_Position = view * vec4(place, 1.); }`;
+const LINE_FRAGMENT = `#version 300 es
+precision mediump float; uniform vec4 paint; out vec4 result; void main() { result = paint; }`;
+
+class CloudViewer {
+  /// `cloud`: { count, extent: [x, y, z], center, classes: [{ color, shown }] }; `bytes`: positions (u16 ×3), colours (u8 ×3),
+  /// class, confidence, views, unused (u8 ×4), normals (i8 ×3), one array after the other. Positions are 0..1 of the extent.
+  constructor(canvas, cloud, bytes, cameras, opened) {
+    Object.assign(this, { canvas, cloud, cameras, opened, mode: 0, size: 1, frusta: true, frames: 0 });
+    const gl = this.gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true });
+    if (!gl) throw new Error("this browser has no WebGL 2");
+    this.points = this.program(VERTEX, FRAGMENT);
+    this.lines = this.program(LINE_VERTEX, LINE_FRAGMENT);
+    this.pointArray = this.upload(bytes);
+    this.lineArray = this.frustumLines();
+    this.classTexture = gl.createTexture();
+    this.paintClasses();
+    this.home();
+    this.listen();
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  program(vertex, fragment) {
+    const gl = this.gl, program = gl.createProgram();
+    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    const place = {};
+    for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
+      const name = gl.getActiveUniform(program, i).name;
+      place[name] = gl.getUniformLocation(program, name);
+    }
+    return { program, place };
+  }
+
+  upload(bytes) {
+    const gl = this.gl, n = this.cloud.count, array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.STATIC_DRAW);
+    let at = 0;
+    for (const [i, width, kind, size, whole] of [[0, 3, gl.UNSIGNED_SHORT, 6, true], [1, 3, gl.UNSIGNED_BYTE, 3, true], [3, 3, gl.BYTE, 3, true]]) {
+      gl.enableVertexAttribArray(i);
+      gl.vertexAttribPointer(i, width, kind, whole, 0, at);
+      at += size * n;
+    }
+    gl.enableVertexAttribArray(2);
+    gl.vertexAttribPointer(2, 4, gl.UNSIGNED_BYTE, false, 0, at);
+    return array;
+  }
+
+  frustumLines() {
+    const gl = this.gl, out = [], span = this.span() * 0.03;
+    for (const { center, corners } of this.cameras) {
+      const tips = corners.map(c => c.map((v, i) => center[i] + v * span));
+      tips.forEach((tip, i) => out.push(...center, ...tip, ...tip, ...tips[(i + 1) % 4]));
+    }
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(out), gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+    this.lineCount = out.length / 3;
+    return array;
+  }
+
+  paintClasses() {
+    const gl = this.gl, data = new Uint8Array(256 * 4).fill(255);
+    this.cloud.classes.forEach(({ color, shown }, i) => data.set([...color, shown ? 255 : 0], 4 * i));
+    gl.bindTexture(gl.TEXTURE_2D, this.classTexture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+  }
+
+  span() { return Math.hypot(...this.cloud.extent); }
+
+  /// The whole cloud as the first camera sees it.
+  home() {
+    const first = this.cameras[0];
+    this.target = [...this.cloud.center];
+    this.distance = this.span() * 0.9;
+    this.up = first ? first.down.map(v => -v) : [0, 0, 1];
+    const out = first ? first.axis.map(v => -v) : [0, -1, 0];
+    this.orient(out);
+    this.draw();
+  }
+
+  /// Yaw and pitch of a direction about the up axis.
+  orient(out) {
+    const up = unit(this.up), side = unit(Math.abs(up[0]) < 0.9 ? cross(up, [1, 0, 0]) : cross(up, [0, 1, 0]));
+    this.basis = [side, cross(up, side), up];
+    const [x, y, z] = this.basis.map(b => dot(b, out));
+    this.yaw = Math.atan2(y, x);
+    this.pitch = Math.asin(Math.max(-1, Math.min(1, z / Math.hypot(x, y, z))));
+  }
+
+  matrix() {
+    const c = Math.cos(this.pitch), local = [c * Math.cos(this.yaw), c * Math.sin(this.yaw), Math.sin(this.pitch)];
+    const back = [0, 1, 2].map(i => this.basis.reduce((sum, b, k) => sum + b[i] * local[k], 0));
+    const right = unit(cross(this.basis[2], back)), up = cross(back, right);
+    this.axes = { right, up };
+    const eye = this.target.map((t, i) => t + back[i] * this.distance);
+    const near = this.distance / 200, far = this.distance * 4 + this.span() * 4;
+    const f = 1 / Math.tan(0.4), aspect = this.canvas.width / this.canvas.height, d = near - far;
+    const rows = [[right, f / aspect], [up, f]].map(([axis, s]) => [...axis.map(v => v * s), -dot(axis, eye) * s]);
+    const depth = -dot(back, eye);
+    rows.push([...back.map(v => v * (far + near) / d), depth * (far + near) / d + 2 * far * near / d]);
+    rows.push([...back.map(v => -v), -depth]);
+    return new Float32Array([0, 1, 2, 3].flatMap(c => rows.map(r => r[c])));
+  }
+
+  draw() {
+    if (this.pending) return;
+    this.pending = true;
+    requestAnimationFrame(() => { this.pending = false; this.render(); });
+  }
+
+  render() {
+    const gl = this.gl, canvas = this.canvas, ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const [w, h] = [canvas.clientWidth * ratio | 0, canvas.clientHeight * ratio | 0];
+    if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
+    gl.viewport(0, 0, w, h);
+    gl.clearColor(0.063, 0.07, 0.078, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    const view = this.view = this.matrix();
+    const { place } = this.points;
+    gl.useProgram(this.points.program);
+    gl.uniformMatrix4fv(place.view, false, view);
+    gl.uniform3fv(place.extent, this.cloud.extent);
+    gl.uniform1f(place.size, this.size);
+    gl.uniform1f(place.scale, this.cloud.spacing * h / 0.8);
+    gl.uniform1i(place.mode, this.mode);
+    gl.bindTexture(gl.TEXTURE_2D, this.classTexture);
+    gl.bindVertexArray(this.pointArray);
+    gl.drawArrays(gl.POINTS, 0, this.cloud.count);
+    if (this.frusta && this.lineCount) {
+      gl.useProgram(this.lines.program);
+      gl.uniformMatrix4fv(this.lines.place.view, false, view);
+      gl.uniform4f(this.lines.place.paint, 1, 0.75, 0.2, 1);
+      gl.bindVertexArray(this.lineArray);
+      gl.drawArrays(gl.LINES, 0, this.lineCount);
+    }
+    this.frames++;
+  }
+
+  listen() {
+    const canvas = this.canvas, held = new Map();
+    let moved = 0;
+    canvas.addEventListener("contextmenu", e => e.preventDefault());
+    canvas.addEventListener("pointerdown", e => { canvas.setPointerCapture(e.pointerId); held.set(e.pointerId, [e.offsetX, e.offsetY]); moved = 0; });
+    canvas.addEventListener("pointerup", e => { held.delete(e.pointerId); if (moved < 4) this.pick(e.offsetX, e.offsetY); });
+    canvas.addEventListener("pointercancel", e => held.delete(e.pointerId));
+    canvas.addEventListener("pointermove", e => {
+      const before = held.get(e.pointerId);
+      if (!before) return;
+      const [dx, dy] = [e.offsetX - before[0], e.offsetY - before[1]];
+      if (held.size === 2) {
+        const other = [...held].find(([id]) => id !== e.pointerId)[1];
+        this.zoom(Math.hypot(before[0] - other[0], before[1] - other[1]) / Math.max(1, Math.hypot(e.offsetX - other[0], e.offsetY - other[1])));
+        this.pan(dx / 2, dy / 2);
+      } else if (e.buttons & 2 || e.shiftKey) this.pan(dx, dy);
+      else this.turn(-dx * 0.006, dy * 0.006);
+      moved += Math.abs(dx) + Math.abs(dy);
+      held.set(e.pointerId, [e.offsetX, e.offsetY]);
+    });
+    canvas.addEventListener("wheel", e => { e.preventDefault(); this.zoom(Math.exp(e.deltaY * (e.deltaMode ? 0.05 : 0.0015))); }, { passive: false });
+    canvas.addEventListener("keydown", e => {
+      const act = { ArrowLeft: () => this.turn(-0.1, 0), ArrowRight: () => this.turn(0.1, 0), ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1), "+": () => this.zoom(0.85), "-": () => this.zoom(1.18), h: () => this.home() }[e.key];
+      if (act) { e.preventDefault(); act(); }
+    });
+  }
+
+  turn(yaw, pitch) { this.yaw += yaw; this.pitch = Math.max(-1.55, Math.min(1.55, this.pitch + pitch)); this.draw(); }
+  zoom(factor) { this.distance = Math.max(this.span() * 1e-4, Math.min(this.span() * 20, this.distance * factor)); this.draw(); }
+  pan(dx, dy) {
+    const step = this.distance * 0.845 / Math.max(1, this.canvas.clientHeight), { right, up } = this.axes;
+    this.target = this.target.map((t, i) => t - right[i] * dx * step + up[i] * dy * step);
+    this.draw();
+  }
+
+  /// Where a point of the scene is on the canvas, in CSS pixels; null behind the eye.
+  project(p) {
+    const m = this.view, q = [0, 1, 3].map(r => m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r]);
+    return q[2] <= 0 ? null : [(q[0] / q[2] + 1) / 2 * this.canvas.clientWidth, (1 - q[1] / q[2]) / 2 * this.canvas.clientHeight];
+  }
+
+  /// Opens the view whose camera is nearest to a click.
+  pick(x, y) {
+    let best = null;
+    for (const camera of this.frusta ? this.cameras : []) {
+      const at = this.project(camera.center);
+      const away = at ? Math.hypot(at[0] - x, at[1] - y) : Infinity;
+      if (away < 14 && (!best || away < best.away)) best = { away, camera };
+    }
+    if (best) this.opened(best.camera.view);
+  }
+
+  /// Frames per second over a full turn of `n` frames.
+  async spin(n) {
+    const start = performance.now();
+    for (let i = 0; i < n; i++) {
+      this.yaw += 2 * Math.PI / n;
+      this.render();
+      this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+    }
+    return n * 1000 / (performance.now() - start);
+  }
+}
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const unit = v => { const n = Math.hypot(...v) || 1; return v.map(x => x / n); };
