@@ -30,6 +30,8 @@ pub enum Stage {
     Merge,
     /// Label maps are made from a cloud; one step per view.
     RenderLabels,
+    /// Pictures of a view's maps are drawn; one step per view.
+    DrawViews,
 }
 
 /// What a scene file holds.

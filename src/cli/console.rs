@@ -124,6 +124,7 @@ fn name(stage: Stage) -> String {
         Stage::Fuse => "Fusing depth maps".into(),
         Stage::Merge => "Merging depth maps".into(),
         Stage::RenderLabels => "Rendering label maps".into(),
+        Stage::DrawViews => "Drawing pictures".into(),
     }
 }
 

@@ -13,6 +13,7 @@ mod labels_args;
 mod listen;
 mod one_line;
 mod options;
+mod page_args;
 mod resolve;
 mod semvs;
 mod semvs_args;

@@ -60,6 +60,8 @@ fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crat
         Command::Inspect(args) => commands::inspect(args),
         Command::Evaluate(args) => commands::evaluate(args),
         Command::Labels(args) => commands::labels(args, &recorder.progress()),
+        Command::Report(args) => commands::report(args, &recorder.progress()),
+        Command::Preview(args) => commands::preview(args, &recorder.progress()),
     }?;
     Ok(ExitCode::SUCCESS)
 }

@@ -4,6 +4,7 @@ use super::exchange_args::{ExportArgs, ImportArgs};
 use super::label_options::{CloudForms, LabelInput};
 use super::labels_args::LabelsArgs;
 use super::options::SharedOptions;
+use super::page_args::{PageOption, PreviewArgs, ReportArgs};
 use crate::store::colmap::Pass;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -40,6 +41,8 @@ Examples:
       fuse depth maps that exist, from here or from OpenMVS
   semvs densify colmap/dense
       the same from COLMAP's undistorted workspace, without conversion
+  semvs report out
+      a page about the results in out/, with pictures and a 3D view
   semvs inspect depthmaps/depth0000.dmap
       what is in a file";
 
@@ -55,6 +58,8 @@ pub(crate) enum Command {
     Evaluate(EvaluateArgs),
     Compare(CompareArgs),
     Labels(LabelsArgs),
+    Report(ReportArgs),
+    Preview(PreviewArgs),
 }
 
 /// Make a dense cloud from a scene: depth maps, filters, fusion
@@ -71,6 +76,8 @@ pub(crate) struct DensifyArgs {
     /// depth maps]
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) page: PageOption,
     #[command(flatten)]
     pub(crate) shared: SharedOptions,
 }
@@ -108,6 +115,8 @@ pub(crate) struct FuseArgs {
     /// Cloud to write, .ply, .las or .laz [default: SCENE_dense.ply beside the scene; semvs/dense.ply in a COLMAP folder]
     #[arg(short, long, visible_alias = "output-file", value_name = "OUT", help_heading = "Output")]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) page: PageOption,
     #[command(flatten)]
     pub(crate) shared: SharedOptions,
 }

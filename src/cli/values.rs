@@ -29,6 +29,14 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(refusal()) }
 }
 
+/// Two numbers separated by a comma.
+pub(crate) fn range(text: &str) -> Result<(f32, f32), String> {
+    let refusal = || "expected two numbers separated by a comma, 4,9.5".to_owned();
+    let (low, high) = text.split_once(',').ok_or_else(refusal)?;
+    let number = |text: &str| text.trim().parse().ok().filter(|v: &f32| v.is_finite()).ok_or_else(refusal);
+    Ok((number(low)?, number(high)?))
+}
+
 /// Three finite numbers separated by commas.
 pub(crate) fn offset(text: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> =
@@ -97,6 +105,14 @@ mod tests {
         assert_eq!(offset("500000.5, -2,0"), Ok([500_000.5, -2.0, 0.0]));
         for text in ["", "1,2", "1,2,3,4", "1,2,x", "1,2,inf", "1 2 3"] {
             assert!(offset(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn ranges_are_two_numbers() {
+        assert_eq!(range("4, 9.5"), Ok((4.0, 9.5)));
+        for text in ["", "1", "1,2,3", "1,x", "1,inf"] {
+            assert!(range(text).is_err(), "{text}");
         }
     }
 

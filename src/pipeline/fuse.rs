@@ -76,7 +76,7 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
 }
 
 /// The depth maps of a job; fusion keeps what it needs itself.
-fn open_maps(maps: &DepthMapsJob, loaded: &LoadedScene) -> Result<DepthStore> {
+pub(super) fn open_maps(maps: &DepthMapsJob, loaded: &LoadedScene) -> Result<DepthStore> {
     match (maps, &loaded.workspace) {
         (DepthMapsJob::Folder(folder), _) => {
             let store = DepthStore::new(folder, loaded.search.clone(), 0, Limits::default());

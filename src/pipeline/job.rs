@@ -216,6 +216,8 @@ pub struct Outputs {
     pub las_normals: bool,
     /// JSON summary.
     pub report: Option<PathBuf>,
+    /// Page with pictures; the programs write it after the run.
+    pub report_html: Option<PathBuf>,
     /// Name the images in the scene from the scene's folder, so that it can be used from anywhere; else from the
     /// working folder, as OpenMVS does.
     pub names_from_scene: bool,
@@ -251,6 +253,7 @@ impl Outputs {
             ply_doubles: false,
             las_normals: true,
             report: None,
+            report_html: None,
             names_from_scene: true,
             sparse_cloud: false,
             allow_empty: false,

@@ -67,7 +67,8 @@ fn run(job: &CheckLabelsJob, progress: &Progress) -> Result<LabelCheck> {
     Ok(LabelCheck { table: table.name().to_owned(), classes, compared_by, views, faults })
 }
 
-fn requests_of(loaded: &LoadedScene) -> Vec<LabelRequest> {
+/// What is asked of the label maps of the views that have a pose.
+pub(super) fn requests_of(loaded: &LoadedScene) -> Vec<LabelRequest> {
     let views = loaded.scene.views.iter().enumerate().filter(|(_, view)| view.calibration.is_some());
     views
         .map(|(i, view)| {

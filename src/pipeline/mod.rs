@@ -30,8 +30,10 @@ mod masks;
 mod memory_plan;
 mod outputs;
 mod prepare;
+mod preview;
 mod problem;
 mod record;
+mod report_page;
 mod resume;
 mod skip;
 mod sparse;
@@ -55,4 +57,6 @@ pub use job::{
 };
 pub use labels_check::{CheckLabelsJob, check_labels};
 pub use labels_render::{RenderLabelsJob, RenderedView, render_label_maps};
+pub use preview::{PreviewJob, Previews, preview};
+pub use report_page::{DEFAULT_POINTS, MOST_POINTS, ReportPageJob, WrittenPage, report_page};
 pub use split::{SplitJob, split_scene};

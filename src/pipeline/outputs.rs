@@ -35,32 +35,37 @@ const POINT_BYTES: u64 = 12 + 12 + 3 + 8 + 2 * 8;
 pub(super) fn check_places(outputs: &Outputs, classes: Option<(&ClassTable, &ClassPolicy)>) -> Result<()> {
     let options = cloud_options(outputs, classes.map(|(table, _)| table));
     check_cloud_paths(&outputs.cloud, &options, classes.map(|(_, policy)| policy))?;
-    [&outputs.scene, &outputs.report].into_iter().flatten().try_for_each(|path| check_writable(path))
+    [&outputs.scene, &outputs.report, &outputs.report_html]
+        .into_iter()
+        .flatten()
+        .try_for_each(|path| check_writable(path))
 }
 
-/// Refuses a report in the place of an input or another output, or of a file that is no report: a mistyped name must
+/// Refuses reports in the place of an input or another output, or of a file that is no report: a mistyped name must
 /// not cost a photograph.
 ///
 /// # Errors
 /// [`Error::Content`] about the report.
 pub(super) fn check_report(outputs: &Outputs, inputs: &[PathBuf]) -> Result<()> {
-    let Some(report) = outputs.report.as_deref() else { return Ok(()) };
-    if inputs.iter().any(|input| is_same_file(input, report)) {
-        return Err(Error::content(report, "--report: this run reads that file; choose another name"));
+    let others = [Some(&outputs.cloud), outputs.scene.as_ref()];
+    let (json, html) = (outputs.report.as_deref(), outputs.report_html.as_deref());
+    if let Some(path) = json.filter(|_| json == html) {
+        return Err(Error::content(path, "--report and --report-html name one file; choose another name"));
     }
-    if report == outputs.cloud || Some(report) == outputs.scene.as_deref() {
-        return Err(Error::content(
-            report,
-            "--report: this run writes another file there; choose another name",
-        ));
-    }
-    let mut first = [0u8; 1];
-    let begun = File::open(report).and_then(|mut file| file.read(&mut first));
-    if matches!(begun, Ok(1)) && first != *b"{" {
-        return Err(Error::content(
-            report,
-            "--report: the file there is no report; choose another name or remove it",
-        ));
+    for (option, path, first_byte) in [("--report", json, b'{'), ("--report-html", html, b'<')] {
+        let Some(path) = path else { continue };
+        let refused = |what: &str| Err(Error::content(path, format!("{option}: {what}")));
+        if inputs.iter().any(|input| is_same_file(input, path)) {
+            return refused("this run reads that file; choose another name");
+        }
+        if others.iter().flatten().any(|other| *other == path) {
+            return refused("this run writes another file there; choose another name");
+        }
+        let mut first = [0u8; 1];
+        let begun = File::open(path).and_then(|mut file| file.read(&mut first));
+        if matches!(begun, Ok(1)) && first[0] != first_byte {
+            return refused("the file there is no report; choose another name or remove it");
+        }
     }
     Ok(())
 }

@@ -33,7 +33,12 @@ impl Clock {
         let seconds = (now - self.stage).as_secs_f64();
         let cpu = cpu_seconds();
         let spent = difference(cpu, self.cpu_stage);
-        self.stages.push(StageTime { stage: name.to_owned(), seconds, cpu_seconds: spent });
+        self.stages.push(StageTime {
+            stage: name.to_owned(),
+            seconds,
+            cpu_seconds: spent,
+            peak_memory_bytes: memory::peak(),
+        });
         (self.stage, self.cpu_stage) = (now, cpu);
     }
 

@@ -1,10 +1,11 @@
 //! Per-class figures of a run.
 
 use super::table::{Align, Table, grouped};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// One class of the summary. Counts of pixels are taken in the views that started points.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ClassRow {
     /// Class id, 0 = void.
     pub id: u16,

@@ -2,10 +2,11 @@
 
 use super::classes::{ClassRow, class_table};
 use super::table::{Align, Table, grouped};
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// What `--report` writes. Times make it the one output that differs between equal runs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct RunReport {
     /// Program that ran: `semvs densify`, `DensifyPointCloud`, ...
     pub program: String,
@@ -38,7 +39,8 @@ pub struct RunReport {
 }
 
 /// Time spent in one stage.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct StageTime {
     /// Name of the stage.
     pub stage: String,
@@ -46,10 +48,13 @@ pub struct StageTime {
     pub seconds: f64,
     /// Time of all threads together, seconds; `None` = not measured.
     pub cpu_seconds: Option<f64>,
+    /// Largest resident size of the process at its end, bytes; `None` = not known.
+    pub peak_memory_bytes: Option<u64>,
 }
 
 /// One view of the run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ViewReport {
     /// Position in the scene.
     pub index: u32,
@@ -64,6 +69,7 @@ pub struct ViewReport {
     /// Global IDs of the source views, best first.
     pub sources: Vec<u32>,
     /// Depths allowed, scene units.
+    #[serde(deserialize_with = "range")]
     pub depth_range: [f32; 2],
     /// Pixels with a depth in the final map.
     pub valid_depths: u64,
@@ -79,8 +85,14 @@ pub struct ViewReport {
     pub dropped: Option<String>,
 }
 
+/// Two depths; JSON has no infinity but `null`.
+fn range<'de, D: Deserializer<'de>>(from: D) -> Result<[f32; 2], D::Error> {
+    Ok(<[Option<f32>; 2]>::deserialize(from)?.map(|depth| depth.unwrap_or(f32::INFINITY)))
+}
+
 /// A file that the run wrote.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct OutputReport {
     /// Path as given or derived.
     pub path: String,
@@ -134,7 +146,7 @@ mod tests {
             cpu_level: Some("avx2".into()),
             scene: "scene.mvs".into(),
             options: [("number-views-fuse".to_owned(), serde_json::json!(2))].into_iter().collect(),
-            stages: vec![StageTime { stage: "fusion".into(), seconds: 1.25, cpu_seconds: None }],
+            stages: vec![StageTime { stage: "fusion".into(), seconds: 1.25, ..StageTime::default() }],
             seconds: 12.0,
             cpu_seconds: Some(20.0),
             peak_memory_bytes: None,
@@ -169,6 +181,15 @@ mod tests {
         assert_eq!(json["views"][0]["depth_range"][1], serde_json::Value::Null);
         assert_eq!(json["outputs"][0]["points"], 12_345);
         assert!(text.ends_with("}\n"));
+    }
+
+    #[test]
+    fn a_report_is_read_as_it_was_written() {
+        let read: RunReport = serde_json::from_str(&report().to_json().unwrap()).unwrap();
+        assert_eq!(read, report());
+        let older: RunReport =
+            serde_json::from_str(r#"{"program": "semvs", "more": 1, "stages": []}"#).unwrap();
+        assert_eq!(older, RunReport { program: "semvs".into(), ..RunReport::default() });
     }
 
     #[test]

@@ -1,9 +1,12 @@
-//! Small pictures that explain results: text, and the PNG file.
+//! Pictures that explain results: text in them, and their bytes as PNG and JPEG.
 
 use super::atomic::AtomicFile;
 use crate::error::{Error, Result};
 use crate::scene::ColorImage;
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+use std::io::Write;
 use std::path::Path;
 
 const FONT: RasterHeight = RasterHeight::Size20;
@@ -12,28 +15,55 @@ const FONT: RasterHeight = RasterHeight::Size20;
 ///
 /// # Errors
 /// The file cannot be written.
-pub(super) fn write_picture(path: &Path, image: &ColorImage) -> Result<()> {
+pub(crate) fn write_picture(path: &Path, image: &ColorImage) -> Result<()> {
     let failed = |e: png::EncodingError| match e {
         png::EncodingError::IoError(e) => Error::io(path, "write", e),
         e => Error::content(path, format!("cannot write: {e}")),
     };
     let mut file = AtomicFile::create(path)?;
-    let mut encoder = png::Encoder::new(&mut file, image.size().width, image.size().height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header().map_err(failed)?;
-    writer.write_image_data(image.data().as_flattened()).map_err(failed)?;
-    writer.finish().map_err(failed)?;
+    encode_png(&mut file, image).map_err(failed)?;
     file.commit()
 }
 
+/// The bytes of a PNG file of `image`: for pictures of few colours with sharp borders.
+///
+/// # Errors
+/// An image without pixels.
+pub(crate) fn png_bytes(image: &ColorImage) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    encode_png(&mut bytes, image).map_err(|e| Error::invalid(format!("no PNG: {e}")))?;
+    Ok(bytes)
+}
+
+/// The bytes of a JPEG file of `image`; `quality`: 1 to 100.
+///
+/// # Errors
+/// An image without pixels.
+pub(crate) fn jpeg_bytes(image: &ColorImage, quality: u8) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let (width, height) = (image.size().width, image.size().height);
+    JpegEncoder::new_with_quality(&mut bytes, quality)
+        .encode(image.data().as_flattened(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|e| Error::invalid(format!("no JPEG: {e}")))?;
+    Ok(bytes)
+}
+
+fn encode_png(to: impl Write, image: &ColorImage) -> std::result::Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(to, image.size().width, image.size().height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(image.data().as_flattened())?;
+    writer.finish()
+}
+
 /// Pixels that `text` is wide; it is 20 high.
-pub(super) fn text_width(text: &str) -> usize {
+pub(crate) fn text_width(text: &str) -> usize {
     text.chars().count() * get_raster_width(FontWeight::Regular, FONT)
 }
 
 /// `text` in black with its upper left corner at (`x`, `y`); a character that the font lacks is shown as `?`.
-pub(super) fn put_text(image: &mut ColorImage, x: usize, y: usize, text: &str) {
+pub(crate) fn put_text(image: &mut ColorImage, x: usize, y: usize, text: &str) {
     let raster = |c| get_raster(c, FontWeight::Regular, FONT);
     let width = get_raster_width(FontWeight::Regular, FONT);
     for (i, raster) in text.chars().filter_map(|c| raster(c).or_else(|| raster('?'))).enumerate() {
@@ -43,5 +73,23 @@ pub(super) fn put_text(image: &mut ColorImage, x: usize, y: usize, text: &str) {
                 image[(left + dx, y + dy)] = [255 - ink; 3];
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Size;
+
+    #[test]
+    fn bytes_are_what_decoders_read() {
+        let mut picture = ColorImage::filled(Size::new(40, 30), [200, 30, 60]);
+        picture.data_mut()[0] = [1, 2, 3];
+        let png = image::load_from_memory(&png_bytes(&picture).unwrap()).unwrap().into_rgb8();
+        assert_eq!(png.as_raw(), picture.data().as_flattened());
+        let jpeg = image::load_from_memory(&jpeg_bytes(&picture, 85).unwrap()).unwrap().into_rgb8();
+        assert_eq!(jpeg.dimensions(), (40, 30));
+        assert!(jpeg.get_pixel(30, 20).0.iter().zip([200, 30, 60]).all(|(&a, b)| a.abs_diff(b) < 6));
+        assert!(png_bytes(&ColorImage::filled(Size::new(0, 3), [0; 3])).is_err());
     }
 }

@@ -12,7 +12,7 @@ mod depth_map;
 pub mod depth_store;
 pub mod diagnostics;
 pub(crate) mod digest;
-mod drawing;
+pub(crate) mod drawing;
 pub mod export;
 pub(crate) mod faults;
 #[cfg(test)]
@@ -36,6 +36,7 @@ mod ply_cloud;
 pub(crate) mod ply_source;
 pub mod rasters;
 pub mod reliability_diagram;
+pub mod run_folder;
 pub(crate) mod space;
 pub mod spool;
 mod stale_clouds;

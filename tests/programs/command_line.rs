@@ -30,9 +30,10 @@ fn golden(name: &str, text: &str) {
 fn help_is_as_agreed() {
     let scratch = Scratch::new();
     golden("semvs.txt", &scratch.semvs("--help").ok().stdout);
-    for command in
-        ["densify", "fuse", "convert", "import", "export", "inspect", "evaluate", "compare", "labels"]
-    {
+    for command in [
+        "densify", "fuse", "convert", "import", "export", "inspect", "evaluate", "compare", "labels",
+        "report", "preview",
+    ] {
         let help = scratch.semvs(&format!("{command} --help")).ok().stdout;
         golden(&format!("semvs-{command}.txt"), &help);
     }

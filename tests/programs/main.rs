@@ -18,6 +18,7 @@ mod labels;
 mod line;
 mod masks;
 mod odd_inputs;
+mod pages;
 mod pipelines;
 mod resume;
 mod runs;

@@ -2,14 +2,14 @@
 
 use super::{
     agreeing_on_class, cloud_path, conclude, default_cloud, effective, is_typed, outputs, own_folder,
-    resolver, spare_workspace,
+    resolver, spare_workspace, write_page,
 };
 use crate::cli::listen::Recorder;
 use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::DensifyArgs;
 use crate::error::{Error, Result};
-use crate::pipeline::{self, DensifyJob};
+use crate::pipeline::{self, DensifyJob, DepthMapsJob};
 use crate::stereo::Quality;
 use crate::store::paths::is_same_file;
 use clap::ArgMatches;
@@ -23,7 +23,10 @@ pub(crate) fn densify(args: &DensifyArgs, typed: &ArgMatches, recorder: &Arc<Rec
     let report = pipeline::densify(&job, resolve::cpu()?, &recorder.progress())?;
     let mut options = effective::options_in_effect::<DensifyArgs>(typed);
     effective::resolve(&mut options, &job.input, &job.outputs, None, Some(&job.filter), &job.fusion);
-    conclude(report, "semvs densify", options, recorder, job.outputs.report.as_deref())
+    let report = conclude(report, "semvs densify", options, recorder, &job.outputs)?;
+    let maps =
+        (job.depth_maps_only || !job.remove_depth_maps).then(|| DepthMapsJob::Folder(job.depth_maps.clone()));
+    write_page(report, &job.input, &job.outputs, maps, &recorder.progress())
 }
 
 fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<DensifyJob> {
@@ -38,7 +41,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
             "--output: the scene written beside the cloud would replace the input; choose another name";
         return Err(Error::content(&cloud, what));
     }
-    let outputs = outputs(&shared.labels.output, cloud, Some(scene));
+    let outputs = outputs(&shared.labels.output, &args.page, cloud, Some(scene))?;
     spare_workspace(&args.scene, &outputs)?;
     let folder = match &shared.run.working_folder {
         Some(folder) => folder.clone(),

@@ -2,7 +2,7 @@
 
 use super::{
     agreeing_on_class, cloud_path, conclude, default_cloud, effective, is_typed, outputs, resolver,
-    spare_workspace,
+    spare_workspace, write_page,
 };
 use crate::cli::listen::Recorder;
 use crate::cli::resolve::Resolver;
@@ -25,7 +25,8 @@ pub(crate) fn fuse(args: &FuseArgs, typed: &ArgMatches, recorder: &Arc<Recorder>
         DepthMapsJob::Colmap(_) => None,
     };
     effective::resolve(&mut options, &job.input, &job.outputs, folder, None, &job.fusion);
-    conclude(report, "semvs fuse", options, recorder, job.outputs.report.as_deref())
+    let report = conclude(report, "semvs fuse", options, recorder, &job.outputs)?;
+    write_page(report, &job.input, &job.outputs, Some(job.depth_maps), &recorder.progress())
 }
 
 fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<FuseJob> {
@@ -33,7 +34,7 @@ fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<F
     let folder = shared.run.working_folder.clone().unwrap_or_default();
     let size_is_typed = ["resolution-level", "max-resolution", "min-resolution"];
     let cloud = args.output.as_deref().map_or_else(|| Ok(default_cloud(&args.scene)), cloud_path)?;
-    let outputs = outputs(&shared.labels.output, cloud, None);
+    let outputs = outputs(&shared.labels.output, &args.page, cloud, None)?;
     spare_workspace(&args.scene, &outputs)?;
     Ok(FuseJob {
         input: resolver.scene(args.scene.clone(), folder)?,

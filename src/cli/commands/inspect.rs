@@ -29,6 +29,10 @@ fn text(facts: &Value) -> String {
         let name = name.replace('_', " ");
         match value {
             Value::Array(rows) if rows.iter().any(Value::is_object) => {
+                if let Some(bars) = bars(rows) {
+                    let _ = write!(out, "{name}:\n{bars}");
+                    continue;
+                }
                 let _ = writeln!(out, "{name}: {}", rows.len());
                 for row in rows.iter().take(MAX_ROWS) {
                     let _ = writeln!(out, "  {}", inline(row));
@@ -49,6 +53,27 @@ fn text(facts: &Value) -> String {
         }
     }
     out
+}
+
+/// Widest bar of a histogram, characters.
+const BAR: f64 = 40.0;
+
+/// A histogram as lines of bars; `None` if the rows are no histogram.
+fn bars(rows: &[Value]) -> Option<String> {
+    let bar = |row: &Value| Some((row["from"].as_f64()?, row["to"].as_f64()?, row["pixels"].as_u64()?));
+    let bars = rows.iter().map(bar).collect::<Option<Vec<_>>>()?;
+    let most = bars.iter().map(|bar| bar.2).max()?.max(1);
+    let line = |&(from, to, pixels): &(f64, f64, u64)| {
+        let bar = "#".repeat((pixels as f64 / most as f64 * BAR).ceil() as usize);
+        format!("  {:>10} to {:<10} {bar:<40} {pixels}\n", short(from), short(to))
+    };
+    Some(bars.iter().map(line).collect())
+}
+
+/// Four digits of a number, or a few more.
+fn short(v: f64) -> String {
+    let digits = 3usize.saturating_sub(v.abs().max(1.0).log10() as usize);
+    format!("{v:.digits$}")
 }
 
 fn inline(value: &Value) -> String {
@@ -72,6 +97,18 @@ fn inline(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn histograms_become_bars() {
+        let bar =
+            |from: f64, pixels: u64| serde_json::json!({"from": from, "to": from + 0.5, "pixels": pixels});
+        let text =
+            text(&serde_json::json!({"depth_histogram": [bar(9.75, 10), bar(10.25, 40), bar(10.75, 0)]}));
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], "depth histogram:");
+        assert_eq!(lines[1], format!("       9.750 to 10.25      {:<40} 10", "#".repeat(10)));
+        assert!(lines[2].contains(&"#".repeat(40)) && lines[3].ends_with(" 0") && !lines[3].contains('#'));
+    }
 
     #[test]
     fn facts_become_lines() {

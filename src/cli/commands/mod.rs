@@ -10,6 +10,8 @@ mod fuse;
 mod import;
 mod inspect;
 mod labels;
+mod preview;
+mod report;
 
 pub(crate) use compare::{INCOMPARABLE, compare};
 pub(crate) use convert::convert;
@@ -20,14 +22,18 @@ pub(crate) use fuse::fuse;
 pub(crate) use import::import;
 pub(crate) use inspect::inspect;
 pub(crate) use labels::labels;
+pub(crate) use preview::preview;
+pub(crate) use report::report;
 
 use super::exchange_args::ArchiveArgs;
 use super::label_options::LabelOutput;
 use super::listen::Recorder;
 use super::options::SharedOptions;
+use super::page_args::PageOption;
 use super::resolve::{self, Resolver};
 use crate::error::{Error, Result};
-use crate::pipeline::{DEPTH_MAP, Outputs};
+use crate::pipeline::{self, DEFAULT_POINTS, DEPTH_MAP, DepthMapsJob, Outputs, ReportPageJob, SceneJob};
+use crate::progress::Progress;
 use crate::report::{OutputReport, RunReport};
 use crate::store::atomic::write_file;
 use crate::store::cloud::{CloudFormat, PlyLayout};
@@ -82,8 +88,9 @@ fn spare_workspace(scene: &Path, outputs: &Outputs) -> Result<()> {
         return Ok(());
     }
     let workspace = Workspace::at(scene, None)?;
-    let paths = [Some(&outputs.cloud), outputs.scene.as_ref(), outputs.report.as_ref()];
-    match paths.into_iter().flatten().find(|path| workspace.owns(path)) {
+    let reports = [outputs.report.as_ref(), outputs.report_html.as_ref()];
+    let paths = [Some(&outputs.cloud), outputs.scene.as_ref()].into_iter().chain(reports);
+    match paths.flatten().find(|path| workspace.owns(path)) {
         Some(path) => {
             Err(Error::content(path, "this is a file of COLMAP; choose another name for the output"))
         }
@@ -120,12 +127,22 @@ fn resolver<'a>(options: &'a SharedOptions, recorder: &Arc<Recorder>) -> Result<
 }
 
 /// What to write for the options about labelled outputs.
-fn outputs(typed: &LabelOutput, cloud: PathBuf, scene: Option<PathBuf>) -> Outputs {
-    Outputs {
+///
+/// # Errors
+/// A page that is not named like one.
+fn outputs(
+    typed: &LabelOutput,
+    page: &PageOption,
+    cloud: PathBuf,
+    scene: Option<PathBuf>,
+) -> Result<Outputs> {
+    page.report_html.as_deref().map_or(Ok(()), report::check_page)?;
+    Ok(Outputs {
         scene,
         report: typed.report.clone(),
+        report_html: page.report_html.clone(),
         ..resolve::outputs(&typed.clouds, cloud, PlyLayout::Plain)
-    }
+    })
 }
 
 /// Fewest images of a point where they must agree on its class, too; `None`: as typed.
@@ -134,22 +151,63 @@ fn agreeing_on_class(typed: &ArgMatches) -> Option<u32> {
     (!is_typed(typed, "number-views-fuse")).then_some(FEWEST)
 }
 
-/// Completes the report of `program`, prints its summary, and writes it to `path`.
+/// Completes the report of `program`, prints its summary, and writes it as `outputs` says.
 fn conclude(
     mut report: RunReport,
     program: &str,
     options: Map<String, Value>,
     recorder: &Recorder,
-    path: Option<&Path>,
-) -> Result<()> {
+    outputs: &Outputs,
+) -> Result<RunReport> {
     report.program = program.to_owned();
     report.version = env!("CARGO_PKG_VERSION").to_owned();
     report.options = options;
     report.warnings = recorder.warnings();
-    if let Some(path) = path {
+    if let Some(path) = &outputs.report_html {
+        let (path, content) = (path.display().to_string(), "page about the run".to_owned());
+        report.outputs.push(OutputReport { path, content, points: None });
+    }
+    if let Some(path) = &outputs.report {
         write_report(&report, path)?;
     }
     crate::cli::print(&with_maps_in_one_row(&report).summary());
+    Ok(report)
+}
+
+/// Writes the page about a run, if one is asked for.
+///
+/// # Errors
+/// What the run wrote cannot be read again, or the place cannot be written.
+fn write_page(
+    run: RunReport,
+    input: &SceneJob,
+    outputs: &Outputs,
+    depth_maps: Option<DepthMapsJob>,
+    progress: &Progress,
+) -> Result<()> {
+    let Some(output) = outputs.report_html.clone() else { return Ok(()) };
+    let own_scene = outputs.scene.clone().map(|scene| {
+        let folder = scene.parent().unwrap_or(Path::new("")).to_owned();
+        (scene, folder)
+    });
+    let (scene, working_folder) =
+        own_scene.unwrap_or_else(|| (input.scene.clone(), input.working_folder.clone()));
+    let written = |output: &OutputReport| Path::new(&output.path) == outputs.cloud;
+    let page = pipeline::report_page(
+        &ReportPageJob {
+            output,
+            scene,
+            working_folder,
+            cloud: run.outputs.iter().any(written).then(|| outputs.cloud.clone()),
+            depth_maps,
+            labels: input.labels.as_ref().map(|labels| labels.sources.clone()),
+            run: Some(run),
+            points: DEFAULT_POINTS,
+            max_threads: input.max_threads,
+        },
+        progress,
+    )?;
+    report::print(&page);
     Ok(())
 }
 

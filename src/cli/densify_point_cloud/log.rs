@@ -101,7 +101,7 @@ fn file_name() -> PathBuf {
 
 fn stage_name(stage: Stage) -> Option<&'static str> {
     match stage {
-        Stage::PrepareImages | Stage::CheckLabels | Stage::RenderLabels => None,
+        Stage::PrepareImages | Stage::CheckLabels | Stage::RenderLabels | Stage::DrawViews => None,
         Stage::Estimate => Some("Estimated depth-maps"),
         Stage::Geometric { .. } => Some("Geometric-consistent estimated depth-maps"),
         Stage::Filter => Some("Filtered depth-maps"),

@@ -1,7 +1,7 @@
 //! What is in a depth map file.
 
 use super::bytes_of;
-use super::values::{Range, RangeOf};
+use super::values::{Bar, Range, RangeOf, histogram};
 use crate::error::{Error, Result};
 use semvs_formats::Limits;
 use semvs_formats::dmap::{DepthMapFile, read_header};
@@ -41,10 +41,14 @@ pub struct DepthMapFacts {
     pub valid_share: f64,
     /// Depths.
     pub depth: Option<Range>,
+    /// How many pixels have which depth.
+    pub depth_histogram: Vec<Bar>,
     /// Whether there are normals.
     pub normals: bool,
     /// Confidences of the pixels with a depth.
     pub confidence: Option<Range>,
+    /// How many of them have which.
+    pub confidence_histogram: Vec<Bar>,
     /// Whether the images of every pixel are stored.
     pub views: bool,
 }
@@ -62,6 +66,9 @@ pub(super) fn inspect(path: &Path) -> Result<DepthMapFacts> {
             map.confidence.get(i).into_iter().for_each(|&c| confidence.add(f64::from(c)));
         }
     }
+    let with_depth = || map.depth.iter().copied().enumerate().filter(|(_, d)| *d > 0.0);
+    let bars = depth.range().map(|range| histogram(with_depth().map(|(_, d)| d), range.min, range.max));
+    let confidences = with_depth().filter_map(|(i, _)| map.confidence.get(i).copied());
     let k = &header.k;
     Ok(DepthMapFacts {
         file: path.display().to_string(),
@@ -79,8 +86,10 @@ pub(super) fn inspect(path: &Path) -> Result<DepthMapFacts> {
         valid,
         valid_share: valid as f64 / map.depth.len().max(1) as f64,
         depth: depth.range(),
+        depth_histogram: bars.unwrap_or_default(),
         normals: header.has_normal,
         confidence: confidence.range(),
+        confidence_histogram: histogram(confidences, 0.0, 1.0),
         views: header.has_views,
     })
 }

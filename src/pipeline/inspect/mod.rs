@@ -12,7 +12,7 @@ pub use depth_map::DepthMapFacts;
 pub use las::LasFacts;
 pub use picture::{ClassFacts, ClassTableFacts, ColorShare, IdShare, PictureFacts};
 pub use scene::{CameraFacts, ImageFacts, PointFacts, RoiFacts, SceneFacts};
-pub use values::{Bounds, Range};
+pub use values::{Bar, Bounds, Range};
 
 use crate::error::{Error, Result};
 use serde::Serialize;

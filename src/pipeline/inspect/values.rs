@@ -42,6 +42,34 @@ impl RangeOf {
     }
 }
 
+/// A bar of a histogram.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bar {
+    /// Values from here on,
+    pub from: f64,
+    /// to here.
+    pub to: f64,
+    /// Pixels with such a value.
+    pub pixels: u64,
+}
+
+/// Bars of a histogram.
+const BARS: usize = 10;
+
+/// A histogram of `values` from `from` to `to`; the first and the last bar hold what lies beyond. Empty without values.
+pub(super) fn histogram(values: impl Iterator<Item = f32>, from: f64, to: f64) -> Vec<Bar> {
+    let mut counts = [0u64; BARS];
+    for value in values {
+        let share = (f64::from(value) - from) / (to - from).max(f64::MIN_POSITIVE);
+        counts[((share.clamp(0.0, 1.0) * BARS as f64) as usize).min(BARS - 1)] += 1;
+    }
+    let edge = |i: usize| from + (to - from) * i as f64 / BARS as f64;
+    match counts.iter().sum::<u64>() {
+        0 => Vec::new(),
+        _ => (0..BARS).map(|i| Bar { from: edge(i), to: edge(i + 1), pixels: counts[i] }).collect(),
+    }
+}
+
 /// Corners of the axis-aligned box around points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bounds {

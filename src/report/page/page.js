@@ -2,7 +2,7 @@
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const at = id => document.getElementById(id);
-const LAYERS = [["image", "photograph"], ["depth", "depth"], ["normal", "normals"], ["confidence", "confidence"], ["labels", "label map"], ["removed", "removed by the class check"]];
+const LAYERS = [["image", "photograph"], ["depth", "depth"], ["normal", "normals"], ["confidence", "confidence"], ["labels", "label map"], ["removed", "class check"]];
 
 function make(tag, attributes = {}, ...children) {
   const space = ["svg", "rect", "text", "line", "circle", "title", "g"].includes(tag) && "http://www.w3.org/2000/svg";
@@ -28,10 +28,10 @@ function table(head, rows) {
 /// Horizontal bars: [label, value, text].
 function bars(rows) {
   const most = Math.max(...rows.map(r => r[1]), 1e-9), h = 18;
-  return make("svg", { viewBox: `0 0 360 ${rows.length * h}`, width: 360, role: "img" }, ...rows.flatMap(([label, value, text], i) => [
+  return make("svg", { viewBox: `0 0 380 ${rows.length * h}`, width: 380, role: "img" }, ...rows.flatMap(([label, value, text], i) => [
     make("text", { x: 118, y: i * h + 13, "text-anchor": "end" }, label),
-    make("rect", { class: "bar", x: 124, y: i * h + 3, width: 170 * value / most, height: h - 6 }),
-    make("text", { x: 130 + 170 * value / most, y: i * h + 13 }, text)]));
+    make("rect", { class: "bar", x: 124, y: i * h + 3, width: 140 * value / most, height: h - 6 }),
+    make("text", { x: 130 + 140 * value / most, y: i * h + 13 }, text)]));
 }
 
 function histogram(values, low, high) {
@@ -44,7 +44,8 @@ function head() {
   at("title").textContent = data.title;
   const parts = [`${count(data.points)} points`, `${data.views.length} views`];
   if (data.seconds) parts.push(`${seconds(data.seconds)}`);
-  if (data.peak_memory) parts.push(`${count(data.peak_memory / 1e6)} MB`);
+  if (data.cpu_seconds) parts.push(`${seconds(data.cpu_seconds)} of processor time`);
+  if (data.peak_memory) parts.push(`${count(data.peak_memory / 1e6)} MB of memory at most`);
   at("summary").textContent = parts.join(" · ");
   at("warnings").append(...data.warnings.map(w => make("li", {}, w)));
   at("footer").textContent = [data.program, data.version, data.cpu_level && `kernels: ${data.cpu_level}`].filter(Boolean).join(" · ");
@@ -70,14 +71,15 @@ function showView() {
   for (const side of ["left", "right"]) {
     const key = shown[side];
     const picture = at(`picture-${side}`);
-    picture.src = key ? view.layers[key] : "data:,";
+    picture.hidden = !key;
+    if (key) picture.src = view.layers[key];
     picture.alt = `${key ?? "nothing"} of ${view.image}`;
     at(`choose-${side}`).replaceChildren(...layers.map(([k, name]) => make("option", { value: k, selected: k === key }, name)));
   }
   at("view-number").value = shown.view;
   at("picture-legend").replaceChildren(...["left", "right"].map(side => legend(side, shown[side], view)).filter(Boolean));
   const facts = [["image", view.image], ["depth map", view.width ? `${view.width} × ${view.height}` : "none"], ["depths", percent(view.coverage)], ["confidence, mean", view.mean_confidence == null ? "–" : view.mean_confidence.toFixed(2)], ["matched with", view.sources.map(nameOf).join(", ") || "–"]];
-  if (view.removed != null) facts.push(["removed by the class check", `${count(view.removed)} depths`]);
+  if (view.removed != null) facts.push(["class check", `${percent(view.removed)} of the depths have their class against them`]);
   if (view.dropped) facts.push(["left out", view.dropped]);
   at("view-facts").replaceChildren(table([], facts));
   for (const button of at("strip").children) button.setAttribute("aria-current", Number(button.dataset.view) === shown.view);
@@ -89,6 +91,7 @@ function legend(side, key, view) {
   const ramp = stops => make("span", { class: "ramp", style: `background:linear-gradient(90deg,${stops.map(css).join(",")})` });
   if (key === "depth") return make("span", {}, `${side}: ${short(view.depth_scale[0])} `, ramp(data.ramps.depth), ` ${short(view.depth_scale[1])} scene units`);
   if (key === "confidence") return make("span", {}, `${side}: 0 `, ramp(data.ramps.confidence), " 1");
+  if (key === "removed") return make("span", {}, `${side}: `, make("span", { class: "swatch", style: "background:rgb(230,40,30)" }), " depths of classes that are not wanted, or whose class most other views contradict");
   if (key === "labels") return make("span", {}, `${side}: `, ...data.classes.flatMap(c => [make("span", { class: "swatch", style: `background:${css(c.color)}` }), ` ${c.name} `]));
   return null;
 }
@@ -143,11 +146,14 @@ function tables() {
     const total = data.classes.reduce((s, c) => s + c.points, 0) || 1;
     at("class-table").append(table(["", "class", { number: "points" }, { number: "share" }, ""], data.classes.map(c => [make("span", { class: "swatch", style: `background:${css(c.color)}` }), c.name, { number: count(c.points) }, { number: percent(c.points / total) }, c.kept ? "" : "not kept"])));
   } else at("classes").hidden = true;
-  at("stage-bars").append(bars(data.stages.map(s => [s.stage, s.seconds, seconds(s.seconds)])));
-  at("coverage-bars").append(histogram(data.coverage_histogram, "0 %", "100 % of pixels"));
-  at("confidence-bars").append(histogram(data.confidence_histogram, "0", "1"));
-  at("outputs").append(table(["file", "content", { number: "points" }], data.outputs.map(o => [o.path, o.content, { number: o.points == null ? "" : count(o.points) }])));
-  at("options").append(table(["option", "value"], Object.entries(data.options).map(([k, v]) => [k, typeof v === "string" ? v : JSON.stringify(v)])));
+  const memory = s => s.peak_memory_bytes ? ` · ${count(s.peak_memory_bytes / 1e6)} MB` : "";
+  const fill = (id, rows, picture) => rows.length ? at(id).append(picture()) : at(id).parentElement.hidden = true;
+  fill("stage-bars", data.stages, () => bars(data.stages.map(s => [s.stage, s.seconds, seconds(s.seconds) + memory(s)])));
+  const filled = bars => bars.filter(v => v > 0);
+  fill("coverage-bars", filled(data.coverage_histogram), () => histogram(data.coverage_histogram, "0 %", "100 % of pixels"));
+  fill("confidence-bars", filled(data.confidence_histogram), () => histogram(data.confidence_histogram, "0", "1"));
+  fill("outputs", data.outputs, () => table(["file", "content", { number: "points" }], data.outputs.map(o => [o.path, o.content, { number: o.points == null ? "" : count(o.points) }])));
+  fill("options", Object.keys(data.options), () => table(["option", "value"], Object.entries(data.options).filter(([, v]) => v !== null && v !== "").map(([k, v]) => [k, typeof v === "string" ? v : JSON.stringify(v)])));
 }
 
 // ---- cloud -------------------------------------------------------------------------------------------------------------
@@ -162,10 +168,11 @@ function cloud() {
   const { cloud } = data;
   if (!cloud || !cloud.count) { at("cloud").hidden = true; return; }
   const cameras = data.views.flatMap((v, i) => v.camera ? [{ ...v.camera, view: i }] : []);
-  const viewer = new CloudViewer(at("viewer"), cloud, bytesOf(at("points").textContent), cameras, openView);
+  const viewer = new CloudViewer(at("viewer"), cloud, bytesOf(at("points").textContent), cameras, data.ramps.confidence, openView);
   window.viewer = viewer;
   at("viewer-note").textContent = `${count(cloud.count)}${cloud.count < data.points ? ` of ${count(data.points)}` : ""} points · drag to turn, shift or right button to move, wheel to zoom, click a camera to open its view`;
-  const modes = [["colour", true], ["class", cloud.classes.length > 1], ["confidence", cloud.has_confidence], ["views per point", cloud.has_views], ["normal", cloud.has_normals]];
+  const modes = [["photograph", cloud.has_colors], ["class", true], ["confidence of depth", cloud.has_confidence], [`views, up to ${cloud.most_views}`, cloud.has_views], ["normal", cloud.has_normals], ["confidence of label", cloud.has_label_confidence]];
+  viewer.mode = modes.findIndex(([, there]) => there);
   const set = change => { change(); viewer.draw(); };
   at("viewer-controls").append(
     make("label", {}, "colours ", make("select", { id: "mode", onchange: e => set(() => viewer.mode = Number(e.target.value)) }, ...modes.flatMap(([name, there], i) => there ? [make("option", { value: i }, name)] : []))),

@@ -2,15 +2,15 @@
 // A point cloud in WebGL 2: orbit, pan, zoom, colours, classes, camera frusta.
 
 const VERTEX = `#version 300 es
-layout(location=0) in vec3 place; layout(location=1) in vec3 rgb; layout(location=2) in vec4 facts; layout(location=3) in vec3 normal;
-uniform mat4 view; uniform vec3 extent; uniform float size, scale; uniform int mode; uniform sampler2D classes;
+layout(location=0) in vec3 place; layout(location=1) in vec2 label; layout(location=2) in vec4 rgb; layout(location=3) in vec4 normal;
+uniform mat4 view; uniform vec3 extent; uniform float size, scale, views; uniform int mode; uniform sampler2D paints;
 out vec3 color;
-vec3 ramp(float t) { return clamp(vec3(sin(3.1*t-1.2)*.9+.15, sin(2.9*t)*.9+.08, cos(3.0*t-.6)*.75+.2), 0., 1.); }
+vec3 ramp(float t) { return texelFetch(paints, ivec2(int(clamp(t, 0., 1.) * 255. + .5), 1), 0).rgb; }
 void main() {
-  vec4 paint = texelFetch(classes, ivec2(int(facts.x + .5), 0), 0);
+  vec4 paint = texelFetch(paints, ivec2(int(label.x + .5), 0), 0);
   gl_Position = paint.a < .5 ? vec4(2., 2., 2., 1.) : view * vec4(place * extent, 1.);
   gl_PointSize = clamp(size * scale / max(gl_Position.w, 1e-6), 1., 24.);
-  color = mode == 0 ? rgb : mode == 1 ? paint.rgb : mode == 2 ? ramp(facts.y) : mode == 3 ? ramp(min(facts.z * 255. / 8., 1.)) : normal * .5 + .5;
+  color = mode == 0 ? rgb.rgb : mode == 1 ? paint.rgb : mode == 2 ? ramp(rgb.a) : mode == 3 ? ramp(normal.w * 127. / views) : mode == 4 ? normal.xyz * .5 + .5 : ramp(label.y / 255.);
 }`;
 const FRAGMENT = `#version 300 es
 precision mediump float; in vec3 color; out vec4 result;
@@ -21,17 +21,18 @@ const LINE_FRAGMENT = `#version 300 es
 precision mediump float; uniform vec4 paint; out vec4 result; void main() { result = paint; }`;
 
 class CloudViewer {
-  /// `cloud`: { count, extent: [x, y, z], center, classes: [{ color, shown }] }; `bytes`: positions (u16 ×3), colours (u8 ×3),
-  /// class, confidence, views, unused (u8 ×4), normals (i8 ×3), one array after the other. Positions are 0..1 of the extent.
-  constructor(canvas, cloud, bytes, cameras, opened) {
-    Object.assign(this, { canvas, cloud, cameras, opened, mode: 0, size: 1, frusta: true, frames: 0 });
-    const gl = this.gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true });
+  /// `cloud`: { count, extent: [x, y, z], center, span, spacing, most_views, classes: [{ color, shown }] }; `ramp`: colours of 0..1;
+  /// `bytes`, 16 of each point: x, y, z (u16, shares of the extent), class, label confidence, red, green, blue, confidence (u8),
+  /// normal (i8 ×3), views (i8). `cameras`: { center, axis, down, corners, view }, all relative to the corner of the extent.
+  constructor(canvas, cloud, bytes, cameras, ramp, opened) {
+    Object.assign(this, { canvas, cloud, cameras, ramp, opened, mode: 0, size: 1, frusta: true, frames: 0 });
+    const gl = this.gl = canvas.getContext("webgl2", { antialias: false });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.points = this.program(VERTEX, FRAGMENT);
     this.lines = this.program(LINE_VERTEX, LINE_FRAGMENT);
     this.pointArray = this.upload(bytes);
     this.lineArray = this.frustumLines();
-    this.classTexture = gl.createTexture();
+    this.paints = gl.createTexture();
     this.paintClasses();
     this.home();
     this.listen();
@@ -57,23 +58,19 @@ class CloudViewer {
   }
 
   upload(bytes) {
-    const gl = this.gl, n = this.cloud.count, array = gl.createVertexArray();
+    const gl = this.gl, array = gl.createVertexArray();
     gl.bindVertexArray(array);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.STATIC_DRAW);
-    let at = 0;
-    for (const [i, width, kind, size, whole] of [[0, 3, gl.UNSIGNED_SHORT, 6, true], [1, 3, gl.UNSIGNED_BYTE, 3, true], [3, 3, gl.BYTE, 3, true]]) {
+    for (const [i, width, kind, isShare, at] of [[0, 3, gl.UNSIGNED_SHORT, true, 0], [1, 2, gl.UNSIGNED_BYTE, false, 6], [2, 4, gl.UNSIGNED_BYTE, true, 8], [3, 4, gl.BYTE, true, 12]]) {
       gl.enableVertexAttribArray(i);
-      gl.vertexAttribPointer(i, width, kind, whole, 0, at);
-      at += size * n;
+      gl.vertexAttribPointer(i, width, kind, isShare, 16, at);
     }
-    gl.enableVertexAttribArray(2);
-    gl.vertexAttribPointer(2, 4, gl.UNSIGNED_BYTE, false, 0, at);
     return array;
   }
 
   frustumLines() {
-    const gl = this.gl, out = [], span = this.span() * 0.03;
+    const gl = this.gl, out = [], span = this.cloud.span * 0.04;
     for (const { center, corners } of this.cameras) {
       const tips = corners.map(c => c.map((v, i) => center[i] + v * span));
       tips.forEach((tip, i) => out.push(...center, ...tip, ...tip, ...tips[(i + 1) % 4]));
@@ -89,10 +86,14 @@ class CloudViewer {
   }
 
   paintClasses() {
-    const gl = this.gl, data = new Uint8Array(256 * 4).fill(255);
+    const gl = this.gl, data = new Uint8Array(2 * 256 * 4).fill(255), last = this.ramp.length - 1;
     this.cloud.classes.forEach(({ color, shown }, i) => data.set([...color, shown ? 255 : 0], 4 * i));
-    gl.bindTexture(gl.TEXTURE_2D, this.classTexture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    for (let i = 0; i < 256; i++) {
+      const place = i / 255 * last, below = Math.min(Math.floor(place), last - 1), share = place - below;
+      data.set([0, 1, 2].map(k => this.ramp[below][k] * (1 - share) + this.ramp[below + 1][k] * share), 4 * (256 + i));
+    }
+    gl.bindTexture(gl.TEXTURE_2D, this.paints);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 256, 2, 0, gl.RGBA, gl.UNSIGNED_BYTE, data);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
   }
@@ -103,7 +104,7 @@ class CloudViewer {
   home() {
     const first = this.cameras[0];
     this.target = [...this.cloud.center];
-    this.distance = this.span() * 0.9;
+    this.distance = this.cloud.span * 0.95;
     this.up = first ? first.down.map(v => -v) : [0, 0, 1];
     const out = first ? first.axis.map(v => -v) : [0, -1, 0];
     this.orient(out);
@@ -155,8 +156,9 @@ class CloudViewer {
     gl.uniform3fv(place.extent, this.cloud.extent);
     gl.uniform1f(place.size, this.size);
     gl.uniform1f(place.scale, this.cloud.spacing * h / 0.8);
+    gl.uniform1f(place.views, Math.max(1, this.cloud.most_views));
     gl.uniform1i(place.mode, this.mode);
-    gl.bindTexture(gl.TEXTURE_2D, this.classTexture);
+    gl.bindTexture(gl.TEXTURE_2D, this.paints);
     gl.bindVertexArray(this.pointArray);
     gl.drawArrays(gl.POINTS, 0, this.cloud.count);
     if (this.frusta && this.lineCount) {
