@@ -22,7 +22,7 @@ pub struct ViewerPoint {
 }
 
 /// Bytes of a point.
-pub const BYTES: usize = 16;
+const BYTES: usize = 16;
 
 /// The points as the viewer takes them: x, y, z as 16-bit shares (little endian) of `extent` from `min` on, class, label
 /// confidence, red, green, blue, confidence, the normal as three signed bytes, and the number of views, at most 127.

@@ -115,7 +115,7 @@ fn a_run_writes_its_page_itself() {
     // What is found later is the same.
     scratch.semvs("report out -o later.html").ok();
     let later = Page::read(&scratch, "later.html");
-    for part in ["views", "edges", "classes", "stages", "options", "cloud", "warnings"] {
+    for part in ["views", "edges", "classes", "options", "cloud", "warnings"] {
         assert_eq!(later.data[part], page.data[part], "{part}");
     }
     // Depth maps alone, and a cloud that the viewer cannot take, have pages too.

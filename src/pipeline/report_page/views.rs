@@ -10,9 +10,7 @@ use crate::report::{
     BARS, PageCamera, PageCloud, PageView, RunReport, ViewReport, add_to, confidence_picture, data_address,
     depth_picture, depth_scale, label_picture, marked_picture, normal_picture,
 };
-use crate::scene::{
-    ColorImage, DepthEstimate, DepthMap, Neighbor, ResolutionOptions, View, ViewIndex, resize_nearest,
-};
+use crate::scene::{ColorImage, DepthEstimate, Neighbor, ResolutionOptions, View, ViewIndex, resize_nearest};
 use crate::store::depth_store::DepthStore;
 use crate::store::drawing::{jpeg_bytes, png_bytes};
 use crate::store::images::load_working_color;
@@ -26,11 +24,11 @@ use std::sync::Arc;
 /// Longest side of a picture.
 const MOST_SIDE: f64 = 480.0;
 /// Pixels of all pictures of one kind together: with more views they are smaller, so that pages of any number stay small.
-const MOST_PIXELS: f64 = 15e6;
+const MOST_PIXELS: f64 = 10e6;
 /// Share of a picture's longest side that the other is taken to have.
 const USUAL_SHAPE: f64 = 0.75;
-/// Quality of photographs, and of maps, whose colours are read.
-const QUALITY: (u8, u8) = (72, 80);
+/// Quality of photographs and of maps.
+const QUALITY: (u8, u8) = (70, 60);
 /// Depths of a view that the common scale is taken from.
 const SCALE_SAMPLE: usize = 2048;
 /// Neighbours of a view that are drawn.
@@ -314,7 +312,7 @@ mod tests {
         let map = Size::new(1600, 1200);
         assert_eq!(picture_size(map, 6), Size::new(480, 360));
         let many = picture_size(map, 200);
-        assert!((300..330).contains(&many.width), "{many}");
+        assert!((240..270).contains(&many.width), "{many}");
         assert_eq!(picture_size(Size::new(200, 150), 6), Size::new(200, 150), "never larger than the map");
         assert_eq!(picture_size(map, 1_000_000).width, 64);
         assert_eq!(picture_size(Size::new(5000, 1), 1).height, 1);

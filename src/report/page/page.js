@@ -78,7 +78,7 @@ function showView() {
   }
   at("view-number").value = shown.view;
   at("picture-legend").replaceChildren(...["left", "right"].map(side => legend(side, shown[side], view)).filter(Boolean));
-  const facts = [["image", view.image], ["depth map", view.width ? `${view.width} × ${view.height}` : "none"], ["depths", percent(view.coverage)], ["confidence, mean", view.mean_confidence == null ? "–" : view.mean_confidence.toFixed(2)], ["matched with", view.sources.map(nameOf).join(", ") || "–"]];
+  const facts = [["image", nameOf(view.id)], ["depth map", view.width ? `${view.width} × ${view.height}` : "none"], ["depths", percent(view.coverage)], ["confidence, mean", view.mean_confidence == null ? "–" : view.mean_confidence.toFixed(2)], ["matched with", view.sources.map(nameOf).join(", ") || "–"]];
   if (view.removed != null) facts.push(["class check", `${percent(view.removed)} of the depths have their class against them`]);
   if (view.dropped) facts.push(["left out", view.dropped]);
   at("view-facts").replaceChildren(table([], facts));
@@ -129,8 +129,8 @@ function graph() {
   const spread = axis => { const p = views.map(v => dot(v.camera.center, axis)); return Math.max(...p) - Math.min(...p); };
   const second = spread(ahead) >= spread(first.down) ? ahead : unit(first.down).map(v => -v);
   const flat = views.map(v => [dot(v.camera.center, right), -dot(v.camera.center, second)]);
-  const low = [0, 1].map(i => Math.min(...flat.map(p => p[i]))), most = Math.max(...[0, 1].map(i => Math.max(...flat.map(p => p[i])) - low[i]), 1e-9);
-  const places = new Map(views.map((v, i) => [v.id, flat[i].map((p, k) => 30 + 840 * (p - low[k]) / most)]));
+  const low = [0, 1].map(i => Math.min(...flat.map(p => p[i]))), most = Math.max(...[0, 1].map(i => (Math.max(...flat.map(p => p[i])) - low[i]) / [840, 320][i]), 1e-9);
+  const places = new Map(views.map((v, i) => [v.id, flat[i].map((p, k) => 30 + (p - low[k]) / most)]));
   const height = 60 + Math.max(...[...places.values()].map(p => p[1] - 30));
   const top = Math.max(...data.edges.map(e => e[2]), 1e-9);
   at("graph-picture").append(make("svg", { viewBox: `0 0 900 ${height}`, width: 900, role: "img" },
