@@ -49,7 +49,8 @@ Examples:
   semvs report out
       writes out/report.html: open it in a browser
   semvs report out -o page.html --points 2000000
-  semvs report out --scene scene.mvs --depth-maps depthmaps --label-path labels --class-table 3dom-facade";
+  semvs report out --scene scene.mvs --depth-maps depthmaps --label-path labels \\
+      --class-table 3dom-facade";
 
 /// `--report-html` of the commands that make a cloud.
 #[derive(Clone, Debug, Args)]

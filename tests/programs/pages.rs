@@ -108,7 +108,7 @@ fn a_run_writes_its_page_itself() {
     let page = Page::read(&scratch, "out/page.html");
     assert_eq!(page.data["program"], "semvs densify");
     assert_eq!(page.layers(3)[..5], ["image", "depth", "normal", "confidence", "labels"]);
-    assert!(page.data["peak_memory"].is_null() == !cfg!(target_os = "linux"));
+    assert_ne!(page.data["peak_memory"].is_null(), cfg!(target_os = "linux"));
     let json: Value = serde_json::from_slice(&scratch.read("out/r.json")).unwrap();
     let written = json["outputs"].as_array().unwrap();
     assert!(written.iter().any(|o| o["path"] == "out/page.html"), "{written:?}");
