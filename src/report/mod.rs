@@ -20,4 +20,4 @@ pub use pictures::{
 };
 pub use run::{OutputReport, RunReport, StageTime, ViewReport};
 pub use table::{Align, Table, grouped};
-pub use viewer_points::{ViewerPoint, chosen, packed};
+pub use viewer_points::{ViewerPoint, chosen, packed, shuffled};

@@ -59,6 +59,14 @@ pub fn chosen(i: u64, count: u64, len: u64) -> u64 {
     from + scattered(i) % (to - from).max(1)
 }
 
+/// The numbers below `count` in an order that looks random but never changes: any first part of points in this order is
+/// spread over all of them.
+pub fn shuffled(count: usize) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..count as u32).collect();
+    order.par_sort_unstable_by_key(|&i| (scattered(i.into()), i));
+    order
+}
+
 /// A number that depends on every bit of `i` (splitmix64, Steele, Lea and Flood 2014).
 fn scattered(i: u64) -> u64 {
     let mut z = i.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -94,6 +102,9 @@ mod tests {
         assert_eq!(part, (0..1000).map(|i| chosen(i, 1000, 12_345)).collect::<Vec<_>>());
         let steps: std::collections::BTreeSet<u64> = part.windows(2).map(|w| w[1] - w[0]).collect();
         assert!(steps.len() > 10, "no stripes: {steps:?}");
+        let order = shuffled(1000);
+        assert!(order[..100].iter().filter(|i| **i < 500).count().abs_diff(50) < 15);
+        assert_eq!(order.iter().collect::<std::collections::BTreeSet<_>>().len(), 1000);
         assert_eq!((0..5).map(|i| chosen(i, 9, 5)).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
     }
 }

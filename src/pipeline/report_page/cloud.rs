@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::geometry::NearestIndex;
-use crate::report::{ClassRow, PageCloud, PageCloudClass, ViewerPoint, chosen, packed};
+use crate::report::{ClassRow, PageCloud, PageCloudClass, ViewerPoint, chosen, packed, shuffled};
 use crate::scene::{CloudLayout, DepthEstimate, PointSource};
 use crate::semantics::{ClassId, ClassTable};
 use crate::store::ply_source::PlySource;
@@ -85,6 +85,10 @@ impl ViewerCloud {
         let listed = source.listed_classes()?;
         let names = counts.keys().map(|&id| (id, name_of(id, table, rows, listed.as_ref()))).collect();
         let (min, extent) = bounding_box(&mut points, &mut labels);
+        // The viewer draws a first part of them while it is in motion.
+        let order = shuffled(points.len());
+        let points: Vec<ViewerPoint> = order.iter().map(|&i| points[i as usize]).collect();
+        let labels: Vec<u16> = order.iter().map(|&i| labels[i as usize]).collect();
         let depths = vec![(0.0, 0); points.len()];
         Ok(ViewerCloud { points, depths, labels, layout, counts, names, met: (false, false), min, extent })
     }

@@ -16,7 +16,7 @@ function make(tag, attributes = {}, ...children) {
 }
 const count = v => Math.round(v).toLocaleString("en").replaceAll(",", "\u202f");
 const percent = v => `${(100 * v).toFixed(v < 0.1 ? 1 : 0)} %`;
-const seconds = v => v < 10 ? `${v.toFixed(1)} s` : v < 120 ? `${v.toFixed(0)} s` : `${(v / 60).toFixed(1)} min`;
+const seconds = v => v < 1 ? `${v.toFixed(2)} s` : v < 10 ? `${v.toFixed(1)} s` : v < 120 ? `${v.toFixed(0)} s` : `${(v / 60).toFixed(1)} min`;
 const short = v => Math.abs(v) >= 1000 || Math.abs(v) < 0.01 ? v.toPrecision(3) : v.toFixed(Math.abs(v) < 10 ? 2 : 1);
 const css = c => `rgb(${c.join(",")})`;
 

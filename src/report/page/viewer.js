@@ -25,7 +25,7 @@ class CloudViewer {
   /// `bytes`, 16 of each point: x, y, z (u16, shares of the extent), class, label confidence, red, green, blue, confidence (u8),
   /// normal (i8 ×3), views (i8). `cameras`: { center, axis, down, corners, view }, all relative to the corner of the extent.
   constructor(canvas, cloud, bytes, cameras, ramp, opened) {
-    Object.assign(this, { canvas, cloud, cameras, ramp, opened, mode: 0, size: 1, frusta: true, frames: 0 });
+    Object.assign(this, { canvas, cloud, cameras, ramp, opened, mode: 0, size: 1, frusta: true, budget: Math.min(cloud.count, 60000) });
     const gl = this.gl = canvas.getContext("webgl2", { antialias: false });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.points = this.program(VERTEX, FRAGMENT);
@@ -135,13 +135,29 @@ class CloudViewer {
     return new Float32Array([0, 1, 2, 3].flatMap(c => rows.map(r => r[c])));
   }
 
-  draw() {
+  /// Draws soon: all points or, while the view moves, as many of them as a fortieth of a second allows. They are stored in an
+  /// order in which any first part is spread over the whole cloud.
+  draw(moving = false) {
+    this.moving = moving;
+    clearTimeout(this.rest);
+    if (moving) this.rest = setTimeout(() => this.draw(), 250);
     if (this.pending) return;
     this.pending = true;
-    requestAnimationFrame(() => { this.pending = false; this.render(); });
+    requestAnimationFrame(() => { this.pending = false; if (this.moving) this.hurry(); else this.render(); });
   }
 
-  render() {
+  hurry() {
+    const start = performance.now();
+    this.render(this.budget);
+    this.wait();
+    const change = 25 / Math.max(performance.now() - start, 1);
+    this.budget = Math.max(2000, Math.min(this.cloud.count, this.budget * Math.max(0.4, Math.min(2, change))));
+  }
+
+  /// Until what was drawn is there.
+  wait() { this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4)); }
+
+  render(count = this.cloud.count) {
     const gl = this.gl, canvas = this.canvas, ratio = Math.min(window.devicePixelRatio || 1, 2);
     const [w, h] = [canvas.clientWidth * ratio | 0, canvas.clientHeight * ratio | 0];
     if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
@@ -154,13 +170,13 @@ class CloudViewer {
     gl.useProgram(this.points.program);
     gl.uniformMatrix4fv(place.view, false, view);
     gl.uniform3fv(place.extent, this.cloud.extent);
-    gl.uniform1f(place.size, this.size);
+    gl.uniform1f(place.size, this.size * Math.min(3, Math.sqrt(this.cloud.count / Math.max(count, 1))));
     gl.uniform1f(place.scale, this.cloud.spacing * h / 0.8);
     gl.uniform1f(place.views, Math.max(1, this.cloud.most_views));
     gl.uniform1i(place.mode, this.mode);
     gl.bindTexture(gl.TEXTURE_2D, this.paints);
     gl.bindVertexArray(this.pointArray);
-    gl.drawArrays(gl.POINTS, 0, this.cloud.count);
+    gl.drawArrays(gl.POINTS, 0, count | 0);
     if (this.frusta && this.lineCount) {
       gl.useProgram(this.lines.program);
       gl.uniformMatrix4fv(this.lines.place.view, false, view);
@@ -168,7 +184,6 @@ class CloudViewer {
       gl.bindVertexArray(this.lineArray);
       gl.drawArrays(gl.LINES, 0, this.lineCount);
     }
-    this.frames++;
   }
 
   listen() {
@@ -198,12 +213,12 @@ class CloudViewer {
     });
   }
 
-  turn(yaw, pitch) { this.yaw += yaw; this.pitch = Math.max(-1.55, Math.min(1.55, this.pitch + pitch)); this.draw(); }
-  zoom(factor) { this.distance = Math.max(this.span() * 1e-4, Math.min(this.span() * 20, this.distance * factor)); this.draw(); }
+  turn(yaw, pitch) { this.yaw += yaw; this.pitch = Math.max(-1.55, Math.min(1.55, this.pitch + pitch)); this.draw(true); }
+  zoom(factor) { this.distance = Math.max(this.span() * 1e-4, Math.min(this.span() * 20, this.distance * factor)); this.draw(true); }
   pan(dx, dy) {
     const step = this.distance * 0.845 / Math.max(1, this.canvas.clientHeight), { right, up } = this.axes;
     this.target = this.target.map((t, i) => t - right[i] * dx * step + up[i] * dy * step);
-    this.draw();
+    this.draw(true);
   }
 
   /// Where a point of the scene is on the canvas, in CSS pixels; null behind the eye.
@@ -223,13 +238,13 @@ class CloudViewer {
     if (best) this.opened(best.camera.view);
   }
 
-  /// Frames per second over a full turn of `n` frames.
-  async spin(n) {
+  /// Frames per second over a full turn of `n` frames of `count` points.
+  spin(n, count = this.cloud.count) {
     const start = performance.now();
     for (let i = 0; i < n; i++) {
       this.yaw += 2 * Math.PI / n;
-      this.render();
-      this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+      this.render(count);
+      this.wait();
     }
     return n * 1000 / (performance.now() - start);
   }
