@@ -3,8 +3,8 @@
 use crate::busy::time;
 use crate::scene::{maps, problem};
 use criterion::{Criterion, Throughput};
-use semvs::scene::DepthEstimate;
-use semvs::stereo::{CpuLevel, StereoOptions, estimate as estimate_view, refine_geometric};
+use semvs::scene::ViewIndex;
+use semvs::stereo::{CpuLevel, SourcePlanes, StereoOptions, estimate as estimate_view, refine_geometric};
 use std::sync::Arc;
 
 pub(crate) fn estimate(c: &mut Criterion) {
@@ -12,8 +12,8 @@ pub(crate) fn estimate(c: &mut Criterion) {
     let problem = problem(&raw);
     let pixels = problem.reference.gray.size().area() as u64;
     let previous = &raw.maps[0].estimate;
-    let sources: Vec<Option<Arc<DepthEstimate>>> =
-        raw.views[0].neighbors.iter().map(|v| Some(raw.maps[v.index()].estimate.clone())).collect();
+    let planes = |v: &ViewIndex| Some(Arc::new(SourcePlanes::new(&raw.maps[v.index()].estimate)));
+    let sources: Vec<Option<Arc<SourcePlanes>>> = raw.views[0].neighbors.iter().map(planes).collect();
     let options = StereoOptions::default();
     // Little but kernels: no coarser levels, nothing relaxed.
     let one_pass = StereoOptions { levels: 0, iterations: 1, geometric_iterations: 0, ..options.clone() };

@@ -2,8 +2,8 @@
 
 use crate::common::facade6;
 use crate::openmvs_maps::{MapsInMemory, scene};
-use semvs::scene::{GrayImage, ResolutionOptions, gray_from_color};
-use semvs::stereo::{SourceImage, StereoProblem};
+use semvs::scene::{GrayImage, ResolutionOptions, ViewIndex, gray_from_color};
+use semvs::stereo::{ReferenceImage, StereoOptions, StereoProblem};
 use std::sync::Arc;
 
 /// Half the size of the photographs: 200 × 150 pixels.
@@ -22,12 +22,14 @@ pub(crate) fn problem(maps: &MapsInMemory) -> StereoProblem {
         let estimate = &maps.maps[view].estimate;
         let color = maps.maps[view].color.as_ref().unwrap();
         let gray: Arc<GrayImage> = Arc::new(gray_from_color(color));
-        SourceImage { gray, camera: estimate.camera.clone(), id: estimate.image_id }
+        ReferenceImage { gray, camera: estimate.camera.clone(), id: estimate.image_id }
     };
+    let halvings = StereoOptions::default().levels;
+    let source = |view: &ViewIndex| image(view.index()).as_source(halvings);
     StereoProblem {
         reference: image(0),
         image_name: maps.maps[0].estimate.image_name.clone(),
-        sources: maps.views[0].neighbors.iter().map(|view| image(view.index())).collect(),
+        sources: maps.views[0].neighbors.iter().map(source).collect(),
         depth_range: maps.maps[0].estimate.depth_range,
         sparse: Vec::new(),
         skip: None,

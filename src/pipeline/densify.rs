@@ -161,8 +161,10 @@ fn make_maps<'a>(
         true => leave_pictures(prepared, store, plan, after, stage),
         false => Ok(()),
     };
-    let at_once = memory.views_at_once;
-    Estimation { prepared, store, plan, options, filter, at_once, cpu, progress }.run()?;
+    let (at_once, planes) = (memory.views_at_once, memory.planes);
+    Estimation { prepared, store, plan, options, filter, at_once, planes, cpu, progress }.run()?;
+    prepared.images.finish_matching();
+    store.hold(memory.filtered);
     pictures(passes, "")?;
     clock.stage("estimate");
     if let Some(across) = &filter.across {

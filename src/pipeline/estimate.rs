@@ -9,7 +9,8 @@ use crate::depth_filter::{fill_gaps, remove_speckles};
 use crate::error::{Error, Result};
 use crate::progress::{Event, Progress, Stage};
 use crate::scene::{DepthEstimate, ViewIndex};
-use crate::stereo::{self, CpuLevel, StereoOptions};
+use crate::stereo::{self, CpuLevel, SourcePlanes, StereoOptions};
+use crate::store::byte_cache::ByteCache;
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::memory;
 use rayon::prelude::*;
@@ -26,6 +27,8 @@ pub(super) struct Estimation<'a> {
     pub(super) filter: &'a FilterJob,
     /// Views that are worked on at a time.
     pub(super) at_once: usize,
+    /// Bytes that the planes of sources' depth maps may take.
+    pub(super) planes: usize,
     pub(super) cpu: CpuLevel,
     pub(super) progress: &'a Progress,
 }
@@ -95,7 +98,7 @@ impl Estimation<'_> {
         let steps = self.progress.start(Stage::Estimate, todo.len());
         for_each_view(todo, self.at_once, self.progress, |view| {
             let start = Instant::now();
-            let problem = stereo_problem(self.prepared, view)?;
+            let problem = stereo_problem(self.prepared, view, self.options.levels)?;
             let mut estimate = stereo::estimate(&problem, self.options, self.cpu)?;
             self.clean(&mut estimate, last);
             let (reference, size) = (estimate.image_id, estimate.depth.size());
@@ -119,15 +122,23 @@ impl Estimation<'_> {
         }
         let (pass, passes) = (stage as usize - 1, self.options.geometric_iterations as usize);
         let steps = self.progress.start(Stage::Geometric { pass, passes }, todo.len());
+        let planes = ByteCache::new(self.planes);
         for_each_view(todo, self.at_once, self.progress, |view| {
-            let problem = stereo_problem(self.prepared, view)?;
+            let problem = stereo_problem(self.prepared, view, self.options.levels)?;
             let before = |view| self.plan.read(self.store, view, stage - 1);
             let previous = before(view)?;
             let refined = |view| self.plan.is_refined(self.prepared, view);
             let sources = self.prepared.neighbors[view.index()].matching().iter();
+            let planes_of = |view| {
+                planes.get_or_load(view, || {
+                    let planes = SourcePlanes::new(&*before(view)?);
+                    let bytes = planes.bytes();
+                    Ok((planes, bytes))
+                })
+            };
             let sources = sources
-                .map(|source| refined(source.view).then(|| before(source.view)).transpose())
-                .collect::<Result<Vec<Option<Arc<DepthEstimate>>>>>()?;
+                .map(|source| refined(source.view).then(|| planes_of(source.view)).transpose())
+                .collect::<Result<Vec<Option<Arc<SourcePlanes>>>>>()?;
             let mut estimate =
                 stereo::refine_geometric(&problem, &previous, &sources, pass, self.options, self.cpu)?;
             self.clean(&mut estimate, last);

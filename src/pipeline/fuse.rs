@@ -57,6 +57,7 @@ fn run(job: &FuseJob, progress: &Progress) -> Result<RunReport> {
     let decode = job.fusion.estimate_colors != AttributeSource::None;
     let memory = MemoryPlan::of(&job.input, &cameras, false)?;
     let prepared = prepare(&job.input, &job.outputs, loaded, cameras, decode, &memory, progress)?;
+    prepared.images.finish_matching();
     let mapped: Vec<ViewIndex> =
         mapped.into_iter().filter(|v| prepared.cameras[v.index()].is_some()).collect();
     let fusion = possible(&job.fusion, prepared.count(), mapped.len(), progress)?;

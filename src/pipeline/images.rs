@@ -4,7 +4,10 @@ use super::memory_plan::MemoryPlan;
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Size};
 use crate::progress::{Progress, Stage};
-use crate::scene::{ColorImage, GrayImage, ResolutionOptions, ViewIndex, gray_from_color, resize_nearest};
+use crate::scene::{
+    ColorImage, GrayImage, ResolutionOptions, ViewIndex, gray_from_color, resize_gray, resize_nearest,
+};
+use crate::stereo::SourceTexels;
 use crate::store::byte_cache::ByteCache;
 use crate::store::images::load_working_color;
 use crate::store::import::LoadedScene;
@@ -18,7 +21,11 @@ pub(super) struct Images {
     paths: Vec<PathBuf>,
     grays: ByteCache<ViewIndex, GrayImage>,
     colors: ByteCache<ViewIndex, ColorImage>,
+    texels: ByteCache<SourceKey, SourceTexels>,
 }
+
+/// What decides the texels of a source: its view, the bits of the factor that it is resized by, how often it is halved.
+type SourceKey = (ViewIndex, u32, u32);
 
 impl Images {
     /// The photographs of all views; nothing is read yet.
@@ -28,6 +35,7 @@ impl Images {
             paths: views.map(|i| loaded.image_path(ViewIndex(i as u32))).collect(),
             grays: ByteCache::new(memory.grays),
             colors: ByteCache::new(memory.colors),
+            texels: ByteCache::new(memory.texels),
         }
     }
 
@@ -65,6 +73,34 @@ impl Images {
         })?;
         self.require_size(view, image.size(), size)?;
         Ok(image)
+    }
+
+    /// A view at `scale` times `size`, and halved up to `halvings` times, as others are matched with it.
+    ///
+    /// # Errors
+    /// As [`Images::color`].
+    pub(super) fn texels(
+        &self,
+        view: ViewIndex,
+        size: Size,
+        scale: f32,
+        halvings: u32,
+    ) -> Result<Arc<SourceTexels>> {
+        self.texels.get_or_load((view, scale.to_bits(), halvings), || {
+            let gray = self.gray(view, size)?;
+            let texels = match scale == 1.0 {
+                true => SourceTexels::new(&gray, halvings),
+                false => SourceTexels::new(&resize_gray(&gray, f64::from(scale)), halvings),
+            };
+            let bytes = texels.bytes();
+            Ok((texels, bytes))
+        })
+    }
+
+    /// Keeps no more of what only estimation needs: luma and texels.
+    pub(super) fn finish_matching(&self) {
+        self.grays.set_budget(0);
+        self.texels.set_budget(0);
     }
 
     fn require_size(&self, view: ViewIndex, found: Size, wanted: Size) -> Result<()> {

@@ -13,10 +13,14 @@ use crate::store::spool::DEFAULT_SPOOL_MEMORY;
 const BASE: u64 = 48 << 20;
 /// Bytes per pixel of a map in memory.
 pub(super) const MAP_BYTES: u64 = 20;
-/// Bytes per pixel of a view while it is estimated: reference, state of two levels, the map twice.
-const VIEW_BYTES: u64 = 90;
-/// Bytes per pixel and source view: its luma, what is made of it, its map and what is made of that.
-const SOURCE_BYTES: u64 = 38;
+/// Bytes per pixel of a view while it is estimated: reference, state of two levels, the map twice, one of a source.
+const VIEW_BYTES: u64 = 100;
+/// Bytes per pixel and source view: its texels, the planes of its map, its classes.
+const SOURCE_BYTES: u64 = 20;
+/// Bytes per pixel of a source's texels at all resolutions.
+const TEXEL_BYTES: u64 = 7;
+/// Bytes per pixel of the planes of a source's map.
+const PLANE_BYTES: u64 = 8;
 /// Bytes per pixel of a view's maps while they are fused.
 const FUSED_BYTES: u64 = 27;
 /// Bytes per pixel of a photograph while it is decoded and scaled.
@@ -27,12 +31,18 @@ const DECODED_BYTES: u64 = 4;
 pub(super) struct MemoryPlan {
     /// Views that are worked on at a time.
     pub(super) views_at_once: usize,
-    /// Depth maps kept between their uses.
+    /// Depth maps kept between their uses in estimation.
     pub(super) maps: usize,
+    /// The same after it, when luma, texels and planes are gone.
+    pub(super) filtered: usize,
     /// Luma kept.
     pub(super) grays: usize,
     /// Colours kept.
     pub(super) colors: usize,
+    /// Texels of sources kept.
+    pub(super) texels: usize,
+    /// Planes of sources' depth maps kept.
+    pub(super) planes: usize,
     /// Maps kept between their uses by fusion.
     pub(super) fusion: u64,
     /// Points kept until the cloud is written; the rest waits in a file.
@@ -40,9 +50,11 @@ pub(super) struct MemoryPlan {
 }
 
 /// Least and most memory for depth maps between the passes, where there is enough.
-const MAPS: (u64, u64) = (176 << 20, 4 << 30);
-/// The same for luma.
-const GRAYS: (u64, u64) = (64 << 20, 4 << 30);
+const MAPS: (u64, u64) = (96 << 20, 4 << 30);
+/// Share of all maps that estimation keeps: a pass needs each of them twice at most.
+const MAPS_KEPT: (u64, u64) = (1, 4);
+/// The same for luma, texels and planes.
+const OTHERS: (u64, u64) = (64 << 20, 4 << 30);
 /// Memory for colours.
 const COLORS: u64 = 64 << 20;
 
@@ -77,9 +89,12 @@ impl MemoryPlan {
         let points = DEFAULT_SPOOL_MEMORY.min(free / 8);
         Ok(MemoryPlan {
             views_at_once: views_at_once as usize,
-            maps: share(2, in_hand * MAP_BYTES, MAPS),
-            grays: share(4, in_hand * size_of::<f32>() as u64, GRAYS),
+            maps: share(4, in_hand * MAP_BYTES * MAPS_KEPT.0 / MAPS_KEPT.1, MAPS),
+            filtered: share(1, in_hand * MAP_BYTES, MAPS).min((cached - cached / 8) as usize),
+            grays: share(8, in_hand * size_of::<f32>() as u64, OTHERS),
             colors: share(8, 0, (COLORS, COLORS)),
+            texels: share(4, in_hand * TEXEL_BYTES, OTHERS),
+            planes: share(4, in_hand * PLANE_BYTES, OTHERS),
             fusion: FusionOptions::default().map_memory.min(free * 5 / 8).max(group.min(free)),
             points,
         })

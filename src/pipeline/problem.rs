@@ -4,9 +4,9 @@ use super::prepare::Prepared;
 use super::skip::{planar, skipped};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Size};
-use crate::scene::{ImageId, LabelMap, Neighbor, SparseInit, SparsePoint, ViewIndex, resize_gray};
+use crate::scene::{ImageId, LabelMap, Neighbor, SparseInit, SparsePoint, ViewIndex};
 use crate::semantics::LabelEstimation;
-use crate::stereo::{ProblemLabels, SourceImage, StereoProblem};
+use crate::stereo::{ProblemLabels, ReferenceImage, SourceImage, StereoProblem};
 use std::sync::Arc;
 
 /// Depths searched beyond those of the sparse points: below the nearest, above the farthest.
@@ -14,20 +14,20 @@ const DEPTH_MARGIN: (f32, f32) = (0.9, 1.1);
 /// A source image whose scale differs by less is matched as it is.
 const MIN_SCALE_DIFFERENCE: f32 = 0.15;
 
-/// The problem of estimating `view`; it must have source views.
+/// The problem of estimating `view`, at up to `halvings` coarser resolutions too; it must have source views.
 ///
 /// # Errors
 /// An image cannot be read.
-pub(super) fn stereo_problem(prepared: &Prepared, view: ViewIndex) -> Result<StereoProblem> {
+pub(super) fn stereo_problem(prepared: &Prepared, view: ViewIndex, halvings: u32) -> Result<StereoProblem> {
     let camera = prepared.camera(view)?;
     let neighbors = prepared.neighbors[view.index()].matching();
-    let sources =
-        neighbors.iter().map(|n| source_image(prepared, n)).collect::<Result<Vec<SourceImage>>>()?;
+    let sources = neighbors.iter().map(|n| source_image(prepared, n, halvings));
+    let sources = sources.collect::<Result<Vec<SourceImage>>>()?;
     let (sparse, depth_range) = sparse_points(prepared, view, camera);
     let skip = skipped(view, camera.size(), prepared.masks.as_ref(), prepared.labels.as_ref())?;
     let labels = labels_of(prepared, view, camera, &sources)?;
     Ok(StereoProblem {
-        reference: SourceImage {
+        reference: ReferenceImage {
             gray: prepared.images.gray(view, camera.size())?,
             camera: camera.clone(),
             id: prepared.id(view),
@@ -56,7 +56,7 @@ fn labels_of(
         Ok(checked.unwrap_or(map))
     };
     let neighbors = prepared.neighbors[view.index()].matching();
-    let of_sources = neighbors.iter().zip(sources).map(|(n, source)| map(n.view, source.gray.size()));
+    let of_sources = neighbors.iter().zip(sources).map(|(n, source)| map(n.view, source.texels.size()));
     Ok(Some(ProblemLabels {
         reference: map(view, camera.size())?,
         sources: of_sources.collect::<Result<_>>()?,
@@ -65,18 +65,18 @@ fn labels_of(
 }
 
 /// The image of a neighbour, resized to the reference's footprint when the two differ much.
-fn source_image(prepared: &Prepared, neighbor: &Neighbor) -> Result<SourceImage> {
+fn source_image(prepared: &Prepared, neighbor: &Neighbor, halvings: u32) -> Result<SourceImage> {
     let camera = prepared.camera(neighbor.view)?;
-    let gray = prepared.images.gray(neighbor.view, camera.size())?;
     let id: ImageId = prepared.id(neighbor.view);
+    let texels = |scale| prepared.images.texels(neighbor.view, camera.size(), scale, halvings);
     if (neighbor.scale - 1.0).abs() < MIN_SCALE_DIFFERENCE || !usable_scale(neighbor.scale) {
-        return Ok(SourceImage { gray, camera: camera.clone(), id });
+        return Ok(SourceImage { texels: texels(1.0)?, camera: camera.clone(), id });
     }
-    let gray = resize_gray(&gray, f64::from(neighbor.scale));
+    let texels = texels(neighbor.scale)?;
     let calibration = prepared.loaded.scene.views[neighbor.view.index()].calibration.as_ref();
     let calibration = calibration.ok_or_else(|| Error::invalid(format!("image {id} has no pose")))?;
-    let camera = calibration.camera_at(gray.size());
-    Ok(SourceImage { gray: Arc::new(gray), camera, id })
+    let camera = calibration.camera_at(texels.size());
+    Ok(SourceImage { texels, camera, id })
 }
 
 /// Stored scores may hold anything; beyond a factor of 4 matching is hopeless at any size.

@@ -1,11 +1,12 @@
 //! One resolution of a stereo problem: the reference, the sources and the maps between them.
 
 use super::plane::Pinhole;
-use super::problem::{SourceImage, StereoProblem};
+use super::problem::StereoProblem;
+use super::source_planes::SourcePlanes;
+use super::texels::{Texels, halved};
 use super::tile::{REACH, TILE_W, WIN_W};
 use crate::geometry::{Camera, Size};
-use crate::scene::resize_gray;
-use crate::scene::{DepthEstimate, GrayImage, LabelMap};
+use crate::scene::{GrayImage, LabelMap};
 use crate::semantics::nearest_labels;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
@@ -51,11 +52,10 @@ impl Reference {
 pub(crate) struct Source {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Per pixel the grey levels, signed, from mid-grey, of itself, the next one, the one below it and the one next to
-    /// that, from the low byte up.
-    pub(crate) quads: Vec<u32>,
-    /// The grey levels alone, and [`Source::SPARE_ROWS`] rows and a few bytes more.
-    pub(crate) bytes: Vec<u8>,
+    /// As [`Texels::quads`].
+    pub(crate) quads: Arc<[u32]>,
+    /// As [`Texels::bytes`].
+    pub(crate) bytes: Arc<[u8]>,
     /// Homogeneous source pixel = `a · (x, y, 1) + b · w`.
     pub(crate) a: [[f32; 3]; 3],
     pub(crate) b: [f32; 3],
@@ -69,9 +69,8 @@ pub(crate) struct Source {
 pub(crate) struct SourceGeometry {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Two words a pixel: the bits of its inverse depth (0 = none), and the upper halves of the bits of its change
-    /// per column (low half) and per row (high half).
-    pub(crate) planes: Vec<u32>,
+    /// As [`SourcePlanes::planes`].
+    pub(crate) planes: Arc<[u32]>,
     pub(crate) a: [[f32; 3]; 3],
     pub(crate) b: [f32; 3],
     /// Pixels of the reference that one unit of the source's inverse depth amounts to.
@@ -121,7 +120,8 @@ impl Weighting {
 impl Level {
     /// The problem at full resolution divided by `2^halvings`.
     pub(crate) fn new(problem: &StereoProblem, halvings: u32) -> Self {
-        let (gray, camera) = shrunk(&problem.reference, halvings);
+        let gray = shrunk(&problem.reference.gray, halvings);
+        let camera = at_size(&problem.reference.camera, gray.size());
         let (fx, fy, cx, cy) = camera.intrinsics();
         let pinhole = Pinhole { fx: fx as f32, fy: fy as f32, cx: cx as f32, cy: cy as f32 };
         let w_range = (1.0 / problem.depth_range.1, 1.0 / problem.depth_range.0);
@@ -131,21 +131,20 @@ impl Level {
             .sources
             .iter()
             .enumerate()
-            .map(|(i, s)| {
-                let (gray, source_camera) = shrunk(s, halvings);
-                let (a, b) = transfer(&camera, &source_camera);
+            .filter_map(|(i, s)| {
+                let Texels { size, quads, bytes } = s.texels.halved(halvings)?;
+                let (a, b) = transfer(&camera, &at_size(&s.camera, *size));
                 pixels_per_w = pixels_per_w.max(shift_per_w(&a, &b, camera.size(), w_mid));
-                let bytes = bytes(&gray);
-                Source {
-                    width: gray.width(),
-                    height: gray.height(),
-                    quads: quads(&bytes, gray.width(), gray.height()),
-                    bytes,
+                Some(Source {
+                    width: size.width as usize,
+                    height: size.height as usize,
+                    quads: quads.clone(),
+                    bytes: bytes.clone(),
                     a: rows_f32(&a),
                     b: [b.x as f32, b.y as f32, b.z as f32],
-                    labels: problem.labels.as_ref().and_then(|l| ids(l.sources.get(i)?, gray.size())),
+                    labels: problem.labels.as_ref().and_then(|l| ids(l.sources.get(i)?, *size)),
                     geometry: None,
-                }
+                })
             })
             .collect();
         Level {
@@ -166,7 +165,7 @@ impl Level {
     pub(crate) fn with_geometry<'a>(
         mut self,
         reference: &Camera,
-        maps: impl Iterator<Item = Option<&'a DepthEstimate>>,
+        maps: impl Iterator<Item = Option<&'a SourcePlanes>>,
         weight: f32,
     ) -> Self {
         self.geometric_weight = weight;
@@ -184,14 +183,14 @@ fn ids(labels: &LabelMap, size: Size) -> Option<Vec<u32>> {
     (size.area() > 0).then(|| labels.data().iter().map(|&id| u32::from(id)).collect())
 }
 
-/// Image and camera divided by `2^halvings`.
-fn shrunk(image: &SourceImage, halvings: u32) -> (Arc<GrayImage>, Camera) {
-    if halvings == 0 {
-        return (image.gray.clone(), image.camera.clone());
-    }
-    let small = resize_gray(&image.gray, 1.0 / f64::from(1u32 << halvings.min(16)));
-    let camera = image.camera.scaled_per_axis(small.size());
-    (Arc::new(small), camera)
+/// The image divided by `2^halvings`.
+fn shrunk(gray: &Arc<GrayImage>, halvings: u32) -> Arc<GrayImage> {
+    if halvings == 0 { gray.clone() } else { Arc::new(halved(gray, halvings)) }
+}
+
+/// The camera of an image that was halved to `size`.
+fn at_size(camera: &Camera, size: Size) -> Camera {
+    if camera.size() == size { camera.clone() } else { camera.scaled_per_axis(size) }
 }
 
 /// `A = K₁R₁R₀ᵀK₀⁻¹` and `b = K₁R₁(C₀ − C₁)`: the source pixel of a reference pixel at inverse depth w is `A p + b w`.
@@ -233,9 +232,6 @@ fn typical_inverse_depth(problem: &StereoProblem) -> f32 {
 }
 
 impl Source {
-    /// Rows behind the last one.
-    const SPARE_ROWS: usize = 8;
-
     /// The grey level at the pixel of `(u, v)`, or the nearest one, in the units of [`Lanes::bilinear`].
     ///
     /// [`Lanes::bilinear`]: super::cost::lanes::Lanes::bilinear
@@ -247,65 +243,18 @@ impl Source {
     }
 }
 
-/// Grey level from mid-grey, as the bits of a signed byte.
-fn level_byte(v: f32) -> u8 {
-    ((v.clamp(0.0, 1.0) * 255.0 + 0.5) as i32 ^ 0x80) as u8
-}
-
-fn bytes(gray: &GrayImage) -> Vec<u8> {
-    let mut out = Vec::with_capacity(gray.width() * (gray.height() + Source::SPARE_ROWS) + 16);
-    out.extend(gray.data().iter().map(|&v| level_byte(v)));
-    out.resize(gray.width() * (gray.height() + Source::SPARE_ROWS) + 16, 0);
-    out
-}
-
-/// Packs every pixel's grey level with those of the three pixels next to and below it.
-fn quads(bytes: &[u8], width: usize, height: usize) -> Vec<u32> {
-    let mut out = Vec::with_capacity(width * height);
-    let row = |y: usize| &bytes[y * width..][..width];
-    for y in 0..height {
-        let (top, bottom) = (row(y), row((y + 1).min(height - 1)));
-        let pair = |(&top, &bottom): (&u8, &u8)| u32::from(top) | u32::from(bottom) << 16;
-        let here = top.iter().zip(bottom).map(pair);
-        let next = top[1..].iter().zip(&bottom[1..]).map(pair);
-        out.extend(here.zip(next).map(|(here, next)| here | next << 8));
-        out.extend(top.last().zip(bottom.last()).map(pair).map(|edge| edge | edge << 8));
-    }
-    out
-}
-
-fn source_geometry(reference: &Camera, map: &DepthEstimate) -> SourceGeometry {
+fn source_geometry(reference: &Camera, map: &SourcePlanes) -> SourceGeometry {
     let (a, b) = transfer(reference, &map.camera);
-    let (fx, fy, cx, cy) = map.camera.intrinsics();
-    let pinhole = Pinhole { fx: fx as f32, fy: fy as f32, cx: cx as f32, cy: cy as f32 };
-    let width = map.depth.width();
-    let mut planes = vec![0; 2 * map.depth.size().area()];
-    let unknown = vec![[0.0, 0.0, -1.0]; width];
-    for (y, out) in planes.chunks_exact_mut(2 * width.max(1)).enumerate() {
-        let normals = map.normal.as_ref().map_or(&unknown[..], |n| n.row(y));
-        let pixels = map.depth.row(y).iter().zip(normals);
-        for ((x, (&depth, &normal)), out) in (0i32..).zip(pixels).zip(out.chunks_exact_mut(2)) {
-            let p = pinhole.plane(x as f32, y as f32, depth, normal);
-            let known = u32::from(depth > 0.0).wrapping_neg();
-            out[0] = p.w.to_bits() & known;
-            out[1] = (upper_half(p.wx) | upper_half(p.wy) << 16) & known;
-        }
-    }
     let baseline = (reference.center() - map.camera.center()).norm();
     let (rx, _, _, _) = reference.intrinsics();
     SourceGeometry {
-        width,
-        height: map.depth.height(),
-        planes,
+        width: map.size.width as usize,
+        height: map.size.height as usize,
+        planes: map.planes.clone(),
         a: rows_f32(&a),
         b: [b.x as f32, b.y as f32, b.z as f32],
         pixels_per_w: (rx * baseline) as f32,
     }
-}
-
-/// The upper half of a float's bits, rounded: eight significant bits.
-fn upper_half(v: f32) -> u32 {
-    v.to_bits().wrapping_add(0x8000) >> 16
 }
 
 const _: () = assert!(PAD >= WIN_W + REACH && PAD >= TILE_W + REACH);

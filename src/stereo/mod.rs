@@ -15,14 +15,18 @@ mod problem;
 mod region_planes;
 mod rng;
 mod solver;
+mod source_planes;
 mod state;
 #[cfg(test)]
 mod tests;
+mod texels;
 mod tile;
 
 pub use cost::CpuLevel;
 pub use options::{Quality, StereoOptions};
-pub use problem::{ProblemLabels, SourceImage, SparsePoint, StereoProblem};
+pub use problem::{ProblemLabels, ReferenceImage, SourceImage, SparsePoint, StereoProblem};
+pub use source_planes::SourcePlanes;
+pub use texels::SourceTexels;
 
 use crate::scene::DepthEstimate;
 use crate::{Error, Result};
@@ -110,7 +114,7 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
 pub fn refine_geometric(
     problem: &StereoProblem,
     previous: &DepthEstimate,
-    sources: &[Option<Arc<DepthEstimate>>],
+    sources: &[Option<Arc<SourcePlanes>>],
     pass: usize,
     options: &StereoOptions,
     cpu: CpuLevel,
@@ -165,6 +169,8 @@ pub fn refine_geometric(
 fn coarsest_level(problem: &StereoProblem, levels: u32) -> u32 {
     let size = problem.reference.gray.size();
     let side = size.width.min(size.height);
+    let levels =
+        problem.sources.iter().map(|s| s.texels.halvings()).min().map_or(levels, |of| of.min(levels));
     (0..=levels).rev().find(|&l| l == 0 || side >> l >= MIN_LEVEL_SIDE).unwrap_or(0)
 }
 
@@ -177,17 +183,18 @@ fn check(problem: &StereoProblem) -> Result<()> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return fail(format!("the depth range {low} to {high} is not usable"));
     }
-    for image in std::iter::once(&problem.reference).chain(&problem.sources) {
-        let side = image.gray.width().max(image.gray.height());
-        if side > MAX_SIDE as usize {
+    let reference = &problem.reference;
+    let sources = problem.sources.iter().map(|s| (s.id, s.texels.size(), s.camera.size()));
+    let all = std::iter::once((reference.id, reference.gray.size(), reference.camera.size())).chain(sources);
+    for (id, of_image, of_camera) in all {
+        let side = of_image.longest();
+        if side > MAX_SIDE {
             return fail(format!(
-                "image {} has {side} pixels on a side, more than {MAX_SIDE}; halve the resolution",
-                image.id
+                "image {id} has {side} pixels on a side, more than {MAX_SIDE}; halve the resolution"
             ));
         }
-        let (of_image, of_camera) = (image.gray.size(), image.camera.size());
         if of_image != of_camera || of_image.area() == 0 {
-            return fail(format!("image {} is {of_image}, its camera is for {of_camera}", image.id));
+            return fail(format!("image {id} is {of_image}, its camera is for {of_camera}"));
         }
     }
     Ok(())

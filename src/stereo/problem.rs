@@ -1,17 +1,37 @@
 //! One view to estimate and what it is matched with.
 
+use super::texels::SourceTexels;
 use crate::geometry::Camera;
 pub use crate::scene::SparsePoint;
 use crate::scene::{GrayImage, Grid, ImageId, LabelMap};
 use crate::semantics::PlanarRegion;
 use std::sync::Arc;
 
-/// A grey image with its camera at the size of that image.
+/// The image to estimate, with its camera at the size of that image.
 #[derive(Clone, Debug)]
-pub struct SourceImage {
+pub struct ReferenceImage {
     /// Luma, 0 black .. 1 white.
     pub gray: Arc<GrayImage>,
     /// Camera at the size of `gray`.
+    pub camera: Camera,
+    /// Global ID of the view.
+    pub id: ImageId,
+}
+
+impl ReferenceImage {
+    /// The same image for others to be matched with, halved up to `halvings` times.
+    pub fn as_source(&self, halvings: u32) -> SourceImage {
+        let texels = Arc::new(SourceTexels::new(&self.gray, halvings));
+        SourceImage { texels, camera: self.camera.clone(), id: self.id }
+    }
+}
+
+/// An image that the reference is matched with, with its camera at the size of that image.
+#[derive(Clone, Debug)]
+pub struct SourceImage {
+    /// Grey levels; at as many resolutions as the reference is to be estimated at, or fewer are used.
+    pub texels: Arc<SourceTexels>,
+    /// Camera at the size of `texels`.
     pub camera: Camera,
     /// Global ID of the view.
     pub id: ImageId,
@@ -32,7 +52,7 @@ pub struct ProblemLabels {
 #[derive(Clone, Debug)]
 pub struct StereoProblem {
     /// The view to estimate.
-    pub reference: SourceImage,
+    pub reference: ReferenceImage,
     /// Path of the reference image as the scene names it.
     pub image_name: String,
     /// The views it is matched with, best first; at least one.

@@ -159,8 +159,8 @@ mod tests {
     use crate::geometry::Camera;
     use crate::scene::{DepthEstimate, Grid};
     use crate::semantics::{PlanarRegion, PlanePrior};
-    use crate::stereo::tests::{Surface, problem, slanted, sphere_before_wall};
-    use crate::stereo::{CpuLevel, SourceImage, StereoOptions, StereoProblem, estimate};
+    use crate::stereo::tests::{Surface, images, problem, problem_of, slanted, sphere_before_wall};
+    use crate::stereo::{CpuLevel, ReferenceImage, StereoOptions, StereoProblem, estimate};
     use nalgebra::Vector3;
 
     /// Columns and rows of the reference that make up the region.
@@ -186,7 +186,7 @@ mod tests {
     }
 
     /// Paints over what lies in a box in space.
-    fn blank(image: &mut SourceImage, surface: Surface, half: f64) {
+    fn blank(image: &mut ReferenceImage, surface: Surface, half: f64) {
         let camera: &Camera = &image.camera;
         let mut gray = (*image.gray).clone();
         for y in 0..gray.height() {
@@ -211,9 +211,9 @@ mod tests {
 
     #[test]
     fn a_pane_without_texture_takes_the_plane_of_its_frame() {
-        let (mut problem, truth) = problem(slanted, 0);
-        blank(&mut problem.reference, slanted, 0.7);
-        problem.sources.iter_mut().for_each(|source| blank(source, slanted, 0.7));
+        let mut images = images(slanted);
+        images.iter_mut().for_each(|(image, _)| blank(image, slanted, 0.7));
+        let (problem, truth) = problem_of(images, 0);
         let without = run(&problem);
         let with = run(&with_region(problem));
         let (before, after) = (right(&without, &truth), right(&with, &truth));

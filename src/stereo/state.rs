@@ -25,8 +25,6 @@ pub(crate) struct State {
     pub(crate) wy: Vec<f32>,
     /// Matching cost.
     pub(crate) cost: Vec<f32>,
-    /// Cost with smoothness and prior.
-    pub(crate) total: Vec<f32>,
     /// Inverse depth of the coarser level; 0 = none.
     pub(crate) prior: Vec<f32>,
     /// 1 for pixels to estimate, 0 for skipped ones and the margin.
@@ -45,7 +43,6 @@ impl State {
             wx: zeros(),
             wy: zeros(),
             cost: vec![UNKNOWN; n],
-            total: vec![UNKNOWN; n],
             prior: zeros(),
             active: zeros(),
         };

@@ -62,7 +62,7 @@ fn camera(center: Vector3<f64>) -> Camera {
     Camera::new(SIZE, k, Matrix3::identity(), center)
 }
 
-fn render(surface: Surface, center: Vector3<f64>, id: u32) -> (SourceImage, Grid<f32>) {
+fn render(surface: Surface, center: Vector3<f64>, id: u32) -> (ReferenceImage, Grid<f32>) {
     let camera = camera(center);
     let (mut gray, mut depth) = (Grid::filled(SIZE, 0.0f32), Grid::filled(SIZE, 0.0f32));
     for y in 0..SIZE.height as usize {
@@ -73,19 +73,31 @@ fn render(surface: Surface, center: Vector3<f64>, id: u32) -> (SourceImage, Grid
             depth[(x, y)] = t as f32;
         }
     }
-    (SourceImage { gray: std::sync::Arc::new(gray), camera, id: ImageId(id) }, depth)
+    (ReferenceImage { gray: std::sync::Arc::new(gray), camera, id: ImageId(id) }, depth)
 }
 
 const CENTERS: [[f64; 3]; 5] =
     [[0.0, 0.0, 0.0], [0.8, 0.0, 0.0], [-0.8, 0.1, 0.0], [0.1, 0.8, 0.0], [0.0, -0.8, 0.1]];
 
+/// The images of all views, with their depths.
+pub(in crate::stereo) fn images(surface: Surface) -> Vec<(ReferenceImage, Grid<f32>)> {
+    (0..5).map(|i| render(surface, Vector3::from(CENTERS[i]), i as u32)).collect()
+}
+
 pub(in crate::stereo) fn problem(surface: Surface, reference: usize) -> (StereoProblem, Grid<f32>) {
-    let mut images: Vec<_> = (0..5).map(|i| render(surface, Vector3::from(CENTERS[i]), i as u32)).collect();
+    problem_of(images(surface), reference)
+}
+
+/// The problem of estimating one of the images by the others, and its depths.
+pub(in crate::stereo) fn problem_of(
+    mut images: Vec<(ReferenceImage, Grid<f32>)>,
+    reference: usize,
+) -> (StereoProblem, Grid<f32>) {
     let (image, depth) = images.remove(reference);
     let problem = StereoProblem {
         reference: image,
         image_name: format!("{reference}.png"),
-        sources: images.into_iter().map(|(i, _)| i).collect(),
+        sources: images.iter().map(|(i, _)| i.as_source(2)).collect(),
         depth_range: (2.0, 9.0),
         sparse: Vec::new(),
         skip: None,
@@ -157,9 +169,8 @@ fn every_cpu_level_and_every_run_gives_the_same_bytes() {
 fn geometric_passes_do_not_lose_what_matching_found() {
     let options = StereoOptions::default();
     let all: Vec<_> = (0..5).map(|i| problem(sphere_before_wall, i)).collect();
-    let maps: Vec<_> =
-        all.iter().map(|(p, _)| Arc::new(estimate(p, &options, CpuLevel::detect()).unwrap())).collect();
-    let sources: Vec<_> = maps[1..].iter().cloned().map(Some).collect();
+    let maps: Vec<_> = all.iter().map(|(p, _)| estimate(p, &options, CpuLevel::detect()).unwrap()).collect();
+    let sources: Vec<_> = maps[1..].iter().map(|map| Some(Arc::new(SourcePlanes::new(map)))).collect();
     let (p, truth) = &all[0];
     let refined = refine_geometric(p, &maps[0], &sources, 0, &options, CpuLevel::detect()).unwrap();
     let right = |e: &DepthEstimate| {

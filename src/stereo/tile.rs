@@ -273,8 +273,7 @@ impl Tile {
             state.w[cut.clone()].copy_from_slice(&b.w[y]);
             state.wx[cut.clone()].copy_from_slice(&b.wx[y]);
             state.wy[cut.clone()].copy_from_slice(&b.wy[y]);
-            state.cost[cut.clone()].copy_from_slice(&b.data[y]);
-            state.total[cut].copy_from_slice(&b.total[y]);
+            state.cost[cut].copy_from_slice(&b.data[y]);
         }
     }
 }

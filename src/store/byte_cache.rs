@@ -10,12 +10,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A value larger than the budget is handed out but not kept. Handed-out values live as long as their `Arc`.
 #[derive(Debug)]
 pub(crate) struct ByteCache<K, V> {
-    budget: usize,
     state: Mutex<State<K, V>>,
 }
 
 #[derive(Debug)]
 struct State<K, V> {
+    budget: usize,
     entries: HashMap<K, Entry<V>>,
     bytes: usize,
     clock: u64,
@@ -31,8 +31,8 @@ struct Entry<V> {
 impl<K: Hash + Eq + Copy, V> ByteCache<K, V> {
     /// An empty cache that keeps up to `budget` bytes.
     pub(crate) fn new(budget: usize) -> Self {
-        let state = State { entries: HashMap::new(), bytes: 0, clock: 0 };
-        ByteCache { budget, state: Mutex::new(state) }
+        let state = State { budget, entries: HashMap::new(), bytes: 0, clock: 0 };
+        ByteCache { state: Mutex::new(state) }
     }
 
     /// The value of `key`: the kept one, else what `load` returns with its size in bytes.
@@ -62,19 +62,21 @@ impl<K: Hash + Eq + Copy, V> ByteCache<K, V> {
     pub(crate) fn insert(&self, key: K, value: Arc<V>, bytes: usize) {
         let mut state = self.lock();
         state.remove(&key);
-        if bytes > self.budget {
+        if bytes > state.budget {
             return;
         }
         state.clock += 1;
         let used = state.clock;
         state.bytes += bytes;
         state.entries.insert(key, Entry { value, bytes, used });
-        while state.bytes > self.budget {
-            let Some(oldest) = state.entries.iter().min_by_key(|(_, e)| e.used).map(|(k, _)| *k) else {
-                break;
-            };
-            state.remove(&oldest);
-        }
+        state.shrink();
+    }
+
+    /// From now on keeps up to `budget` bytes.
+    pub(crate) fn set_budget(&self, budget: usize) {
+        let mut state = self.lock();
+        state.budget = budget;
+        state.shrink();
     }
 
     /// Keeps the value of `key` no longer; returns it.
@@ -89,7 +91,17 @@ impl<K: Hash + Eq + Copy, V> ByteCache<K, V> {
     }
 }
 
-impl<K: Hash + Eq, V> State<K, V> {
+impl<K: Hash + Eq + Copy, V> State<K, V> {
+    /// Drops what was used least recently until the rest is within the budget.
+    fn shrink(&mut self) {
+        while self.bytes > self.budget {
+            let Some(oldest) = self.entries.iter().min_by_key(|(_, e)| e.used).map(|(k, _)| *k) else {
+                break;
+            };
+            self.remove(&oldest);
+        }
+    }
+
     fn remove(&mut self, key: &K) -> Option<Arc<V>> {
         let entry = self.entries.remove(key)?;
         self.bytes -= entry.bytes;
@@ -119,6 +131,16 @@ mod tests {
         assert!(load(&cache, 4, 10));
         assert!(!load(&cache, 1, 10) && !load(&cache, 3, 10) && !load(&cache, 4, 10));
         assert!(load(&cache, 2, 10));
+    }
+
+    #[test]
+    fn a_smaller_budget_drops_what_was_used_first() {
+        let cache = ByteCache::new(30);
+        assert!(load(&cache, 1, 10) && load(&cache, 2, 10) && load(&cache, 3, 10));
+        cache.set_budget(20);
+        assert!(!load(&cache, 2, 10) && !load(&cache, 3, 10) && load(&cache, 1, 10));
+        cache.set_budget(0);
+        assert!(load(&cache, 1, 10) && load(&cache, 1, 10));
     }
 
     #[test]

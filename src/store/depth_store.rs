@@ -84,6 +84,11 @@ impl DepthStore {
         }
     }
 
+    /// From now on up to `memory` bytes of maps are held in memory.
+    pub fn hold(&self, memory: usize) {
+        self.held.set_budget(memory);
+    }
+
     /// The folder.
     pub fn folder(&self) -> &Path {
         &self.folder

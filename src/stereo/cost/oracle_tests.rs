@@ -2,10 +2,12 @@
 
 use super::{CpuLevel, Kernels};
 use crate::geometry::Size;
+use crate::scene::Grid;
+use crate::stereo::ReferenceImage;
 use crate::stereo::level::Level;
 use crate::stereo::plane::InversePlane;
 use crate::stereo::state::State;
-use crate::stereo::tests::{problem, slanted};
+use crate::stereo::tests::{images, problem_of, slanted};
 use crate::stereo::tile::{CENTRE, TILE_H, TILE_W, Tile};
 
 /// Source images have whole grey levels, samples 1/256 of a pixel and 1/32 of a grey level.
@@ -21,18 +23,18 @@ fn bilinear(gray: &crate::scene::GrayImage, u: f64, v: f64) -> f64 {
 
 /// Cost of the plane (anchored at the tile's centre) at pixel (x, y), straight from the definition.
 fn direct_cost(
-    problem: &super::super::StereoProblem,
+    images: &[(ReferenceImage, Grid<f32>)],
     level: &Level,
     plane: InversePlane,
     tile: (i32, i32),
     x: i32,
     y: i32,
 ) -> f64 {
-    let gray = &problem.reference.gray;
+    let gray = &images[0].0.gray;
     let level_at = |x: i32, y: i32| f64::from(gray[(x as usize, y as usize)]) * 255.0;
     let centre = level_at(x, y);
     let mut costs = Vec::new();
-    for (source, image) in level.sources.iter().zip(&problem.sources) {
+    for (source, image) in level.sources.iter().zip(images[1..].iter().map(|(image, _)| image)) {
         let mut texels = Vec::new();
         for dy in [-4, -2, 0, 2, 4] {
             for dx in [-4, -2, 0, 2, 4] {
@@ -64,7 +66,8 @@ fn direct_cost(
 
 #[test]
 fn kernels_agree_with_the_definition() {
-    let (problem, _) = problem(slanted, 0);
+    let images = images(slanted);
+    let (problem, _) = problem_of(images.clone(), 0);
     let level = Level::new(&problem, 0);
     let state = State::random(&level, &problem, 0, 0);
     let at = (48, 32);
@@ -77,13 +80,13 @@ fn kernels_agree_with_the_definition() {
         (kernels.prepare)(&mut tile, &level);
         assert!((kernels.try_plane)(&mut tile, &level, plane));
         for (x, y) in [(0, 0), (7, 3), (15, 7), (3, 6)] {
-            let want = direct_cost(&problem, &level, plane, at, at.0 + x, at.1 + y);
+            let want = direct_cost(&images, &level, plane, at, at.0 + x, at.1 + y);
             let got = f64::from(tile.belief.data[y as usize][x as usize]);
             assert!((got - want).abs() < TOLERANCE, "{} ({x}, {y}): {got} {want}", cpu.name());
         }
         (kernels.score_own)(&mut tile, &level);
         for (x, y) in [(0, 0), (15, 7)] {
-            let want = direct_cost(&problem, &level, plane, at, at.0 + x, at.1 + y);
+            let want = direct_cost(&images, &level, plane, at, at.0 + x, at.1 + y);
             let got = f64::from(tile.belief.data[y as usize][x as usize]);
             assert!((got - want).abs() < TOLERANCE, "own, {} ({x}, {y}): {got} {want}", cpu.name());
         }
