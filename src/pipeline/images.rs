@@ -19,7 +19,6 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct Images {
     paths: Vec<PathBuf>,
-    grays: ByteCache<ViewIndex, GrayImage>,
     colors: ByteCache<ViewIndex, ColorImage>,
     texels: ByteCache<SourceKey, SourceTexels>,
 }
@@ -33,7 +32,6 @@ impl Images {
         let views = 0..loaded.scene.views.len();
         Images {
             paths: views.map(|i| loaded.image_path(ViewIndex(i as u32))).collect(),
-            grays: ByteCache::new(memory.grays),
             colors: ByteCache::new(memory.colors),
             texels: ByteCache::new(memory.texels),
         }
@@ -66,13 +64,7 @@ impl Images {
     /// # Errors
     /// As [`Images::color`].
     pub(super) fn gray(&self, view: ViewIndex, size: Size) -> Result<Arc<GrayImage>> {
-        let image = self.grays.get_or_load(view, || {
-            let image = gray_from_color(&*self.color(view, size)?);
-            let bytes = size_of_val(image.data());
-            Ok((image, bytes))
-        })?;
-        self.require_size(view, image.size(), size)?;
-        Ok(image)
+        Ok(Arc::new(gray_from_color(&*self.color(view, size)?)))
     }
 
     /// A view at `scale` times `size`, and halved up to `halvings` times, as others are matched with it.
@@ -97,9 +89,8 @@ impl Images {
         })
     }
 
-    /// Keeps no more of what only estimation needs: luma and texels.
+    /// Keeps no more of what only estimation needs: texels.
     pub(super) fn finish_matching(&self) {
-        self.grays.set_budget(0);
         self.texels.set_budget(0);
     }
 
@@ -124,7 +115,7 @@ impl Images {
             .with_max_len(1)
             .map(|(view, size)| {
                 progress.check().ok()?;
-                let failed = self.gray(view, size).err().map(|error| (view, error));
+                let failed = self.color(view, size).err().map(|error| (view, error));
                 steps.step();
                 failed
             })

@@ -4,7 +4,6 @@ use super::job::SceneJob;
 use super::prepare::pixels_in_hand;
 use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
-use crate::fusion::FusionOptions;
 use crate::geometry::Camera;
 use crate::store::memory;
 use crate::store::spool::DEFAULT_SPOOL_MEMORY;
@@ -17,6 +16,8 @@ pub(super) const MAP_BYTES: u64 = 20;
 const VIEW_BYTES: u64 = 100;
 /// Bytes per pixel and source view: its texels, the planes of its map, its classes.
 const SOURCE_BYTES: u64 = 20;
+/// Bytes per pixel of a photograph.
+const COLOR_BYTES: u64 = 3;
 /// Bytes per pixel of a source's texels at all resolutions.
 const TEXEL_BYTES: u64 = 7;
 /// Bytes per pixel of the planes of a source's map.
@@ -33,10 +34,8 @@ pub(super) struct MemoryPlan {
     pub(super) views_at_once: usize,
     /// Depth maps kept between their uses in estimation.
     pub(super) maps: usize,
-    /// The same after it, when luma, texels and planes are gone.
+    /// The same after it, when texels and planes are gone.
     pub(super) filtered: usize,
-    /// Luma kept.
-    pub(super) grays: usize,
     /// Colours kept.
     pub(super) colors: usize,
     /// Texels of sources kept.
@@ -50,13 +49,15 @@ pub(super) struct MemoryPlan {
 }
 
 /// Least and most memory for depth maps between the passes, where there is enough.
-const MAPS: (u64, u64) = (96 << 20, 4 << 30);
+const MAPS: (u64, u64) = (64 << 20, 4 << 30);
 /// Share of all maps that estimation keeps: a pass needs each of them twice at most.
 const MAPS_KEPT: (u64, u64) = (1, 4);
-/// The same for luma, texels and planes.
-const OTHERS: (u64, u64) = (64 << 20, 4 << 30);
-/// Memory for colours.
-const COLORS: u64 = 64 << 20;
+/// The same for colours, texels and planes.
+const OTHERS: (u64, u64) = (32 << 20, 4 << 30);
+/// Memory for colours where nothing is estimated: each is needed once to see whether it can be read, once for the points.
+const COLORS: u64 = 8 << 20;
+/// Least memory for the maps that fusion works on, where there is enough; else half as much again as those of a turn.
+const FUSION: u64 = 24 << 20;
 
 impl MemoryPlan {
     /// Shares out what `job` may take for views with these cameras; `estimates`: depth maps are made.
@@ -90,12 +91,15 @@ impl MemoryPlan {
         Ok(MemoryPlan {
             views_at_once: views_at_once as usize,
             maps: share(4, in_hand * MAP_BYTES * MAPS_KEPT.0 / MAPS_KEPT.1, MAPS),
-            filtered: share(1, in_hand * MAP_BYTES, MAPS).min((cached - cached / 8) as usize),
-            grays: share(8, in_hand * size_of::<f32>() as u64, OTHERS),
-            colors: share(8, 0, (COLORS, COLORS)),
+            filtered: share(1, in_hand * MAP_BYTES, MAPS).min((cached - cached / 4) as usize),
+            colors: if estimates {
+                share(4, in_hand * COLOR_BYTES, OTHERS)
+            } else {
+                share(4, COLORS, (COLORS, COLORS))
+            },
             texels: share(4, in_hand * TEXEL_BYTES, OTHERS),
             planes: share(4, in_hand * PLANE_BYTES, OTHERS),
-            fusion: FusionOptions::default().map_memory.min(free * 5 / 8).max(group.min(free)),
+            fusion: (group * 3 / 2).max(FUSION).min(free * 5 / 8).max(group.min(free)),
             points,
         })
     }
