@@ -48,17 +48,17 @@ pub enum Error {
 
 impl Error {
     /// An [`Error::Io`] about `path`.
-    pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+    pub(crate) fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
         Error::Io { path: path.to_owned(), action, source }
     }
 
     /// An [`Error::Format`] about `path`, which was read; what the medium did wrong becomes an [`Error::Io`].
-    pub fn format(path: &Path, source: semvs_formats::Error) -> Self {
+    pub(crate) fn format(path: &Path, source: semvs_formats::Error) -> Self {
         Error::of_file(path, "read", source)
     }
 
     /// An [`Error::Format`] about `path`, which was written; what the medium did wrong becomes an [`Error::Io`].
-    pub fn writing(path: &Path, source: semvs_formats::Error) -> Self {
+    pub(crate) fn writing(path: &Path, source: semvs_formats::Error) -> Self {
         Error::of_file(path, "write", source)
     }
 
@@ -70,12 +70,12 @@ impl Error {
     }
 
     /// An [`Error::Content`] about `path`.
-    pub fn content(path: &Path, what: impl Into<String>) -> Self {
+    pub(crate) fn content(path: &Path, what: impl Into<String>) -> Self {
         Error::Content { path: path.to_owned(), what: what.into() }
     }
 
     /// An [`Error::Invalid`].
-    pub fn invalid(what: impl Into<String>) -> Self {
+    pub(crate) fn invalid(what: impl Into<String>) -> Self {
         Error::Invalid(what.into())
     }
 }

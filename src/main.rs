@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 #[global_allocator]
-static ALLOCATOR: semvs::cli::ExitWhenExhausted = semvs::cli::ExitWhenExhausted;
+static ALLOCATOR: semvs::internals::cli::ExitWhenExhausted = semvs::internals::cli::ExitWhenExhausted;
 
 fn main() -> ExitCode {
-    semvs::cli::semvs(std::env::args_os())
+    semvs::internals::cli::semvs(std::env::args_os())
 }

@@ -34,6 +34,24 @@ pub enum Stage {
     DrawViews,
 }
 
+impl std::fmt::Display for Stage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Stage::PrepareImages => "Preparing images",
+            Stage::CheckLabels => "Checking label maps",
+            Stage::Estimate => "Estimating depth maps",
+            Stage::Geometric { pass, passes } => {
+                return write!(f, "Geometric pass {} of {passes}", pass + 1);
+            }
+            Stage::Filter => "Filtering depth maps",
+            Stage::Fuse => "Fusing depth maps",
+            Stage::Merge => "Merging depth maps",
+            Stage::RenderLabels => "Rendering label maps",
+            Stage::DrawViews => "Drawing pictures",
+        })
+    }
+}
+
 /// What a scene file holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SceneSummary {

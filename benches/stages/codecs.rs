@@ -4,10 +4,10 @@ use crate::busy::time;
 use crate::common::{bytes, facade6};
 use crate::openmvs_maps::points;
 use criterion::{Criterion, Throughput};
-use semvs::progress::Progress;
-use semvs::scene::{PointSource, ResolutionOptions};
-use semvs::store::cloud::{CloudOptions, write_clouds};
-use semvs::store::images::load_working_color;
+use semvs::internals::progress::Progress;
+use semvs::internals::scene::{PointSource, ResolutionOptions};
+use semvs::internals::store::cloud::{CloudOptions, write_clouds};
+use semvs::internals::store::images::load_working_color;
 use semvs_formats::Limits;
 use semvs_formats::dmap::DepthMapFile;
 

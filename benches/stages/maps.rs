@@ -4,13 +4,13 @@ use crate::busy::time;
 use crate::openmvs_maps::MapsInMemory;
 use crate::scene::maps;
 use criterion::{Criterion, Throughput};
-use semvs::depth_filter::{
+use semvs::internals::depth_filter::{
     DepthFilterOptions, FilterView, UnbiasedFilterOptions, fill_gaps, filter_consistency, filter_unbiased,
     remove_speckles,
 };
-use semvs::fusion::{FusionInput, FusionOptions, fuse as fuse_maps};
-use semvs::progress::Progress;
-use semvs::scene::{CloudPoint, DepthEstimate, PointSink};
+use semvs::internals::fusion::{FusionInput, FusionOptions, fuse as fuse_maps};
+use semvs::internals::progress::Progress;
+use semvs::internals::scene::{CloudPoint, DepthEstimate, PointSink};
 
 fn views<'a>(maps: &'a MapsInMemory, view: usize) -> Vec<FilterView<'a>> {
     maps.views[view].neighbors.iter().map(|v| FilterView::new(&maps.maps[v.index()].estimate)).collect()

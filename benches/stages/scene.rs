@@ -2,8 +2,8 @@
 
 use crate::common::facade6;
 use crate::openmvs_maps::{MapsInMemory, scene};
-use semvs::scene::{GrayImage, ResolutionOptions, ViewIndex, gray_from_color};
-use semvs::stereo::{ReferenceImage, StereoOptions, StereoProblem};
+use semvs::internals::scene::{GrayImage, ResolutionOptions, ViewIndex, gray_from_color};
+use semvs::internals::stereo::{ReferenceImage, StereoOptions, StereoProblem};
 use std::sync::Arc;
 
 /// Half the size of the photographs: 200 × 150 pixels.

@@ -4,8 +4,8 @@
 use std::process::ExitCode;
 
 #[global_allocator]
-static ALLOCATOR: semvs::cli::ExitWhenExhausted = semvs::cli::ExitWhenExhausted;
+static ALLOCATOR: semvs::internals::cli::ExitWhenExhausted = semvs::internals::cli::ExitWhenExhausted;
 
 fn main() -> ExitCode {
-    semvs::cli::densify_point_cloud(std::env::args_os().skip(1))
+    semvs::internals::cli::densify_point_cloud(std::env::args_os().skip(1))
 }

@@ -92,7 +92,7 @@ impl Console {
             {
                 bar.set_style(style);
             }
-            bar.set_message(name(stage));
+            bar.set_message(stage.to_string());
             *current = Some((stage, bar));
         }
         if let Some((_, bar)) = current.as_ref() {
@@ -114,20 +114,6 @@ fn begins_a_tenth(done: usize, total: usize) -> bool {
     done > 0 && total > 0 && done * 10 / total > (done - 1) * 10 / total
 }
 
-fn name(stage: Stage) -> String {
-    match stage {
-        Stage::PrepareImages => "Preparing images".into(),
-        Stage::CheckLabels => "Checking label maps".into(),
-        Stage::Estimate => "Estimating depth maps".into(),
-        Stage::Geometric { pass, passes } => format!("Geometric pass {} of {passes}", pass + 1),
-        Stage::Filter => "Filtering depth maps".into(),
-        Stage::Fuse => "Fusing depth maps".into(),
-        Stage::Merge => "Merging depth maps".into(),
-        Stage::RenderLabels => "Rendering label maps".into(),
-        Stage::DrawViews => "Drawing pictures".into(),
-    }
-}
-
 impl Listener for Console {
     fn event(&self, event: &Event) {
         match event {
@@ -144,7 +130,7 @@ impl Listener for Console {
         if self.draw {
             self.draw_steps(stage, done, total);
         } else if begins_a_tenth(done, total) && (done == total || self.is_due()) {
-            self.say(Level::Info, &format!("{}: {done} of {total}", name(stage)));
+            self.say(Level::Info, &format!("{stage}: {done} of {total}"));
         }
     }
 }

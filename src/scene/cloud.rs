@@ -121,7 +121,7 @@ impl PointCloud {
     }
 
     /// All points in order.
-    pub fn iter(&self) -> impl Iterator<Item = CloudPoint<'_>> {
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = CloudPoint<'_>> {
         (0..self.positions.len()).map(|i| self.point(i))
     }
 }

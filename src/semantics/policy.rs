@@ -5,6 +5,7 @@ use crate::Result;
 
 /// How labels restrict which pixels become one point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Consistency {
     /// Not at all; the point's label is voted.
     Off,

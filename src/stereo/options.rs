@@ -4,6 +4,7 @@ use crate::{Error, Result};
 
 /// How much is tried for every depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Quality {
     /// For a look: about 0.6 of the normal time.
     Draft,

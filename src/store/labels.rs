@@ -193,6 +193,15 @@ pub fn survey_labels(
     Ok((reader.table.with_ids(met), findings))
 }
 
+/// The label map at `path`, of the classes of `table`.
+///
+/// # Errors
+/// [`Error`] about `path`: unreadable, not a PNG, an id or colour that the table lacks.
+pub(crate) fn read_label_map(path: &Path, table: &ClassTable, limits: Limits) -> Result<LabelMap> {
+    let (colors, table, unknown) = (table.colors(), table.clone(), UnknownLabel::Refuse);
+    LabelReader { table, colors, table_is_assumed: false, unknown, limits }.read(path, |_| Ok(()))
+}
+
 /// Pixels of each class.
 pub fn count_classes(labels: &LabelMap) -> BTreeMap<ClassId, u64> {
     let mut counts: BTreeMap<ClassId, u64> = BTreeMap::new();

@@ -50,15 +50,19 @@ impl common::Outcome {
 
 /// Names of the instruction sets, and whether this processor has them.
 fn cpu_levels() -> [(&'static str, bool); 3] {
-    [semvs::stereo::CpuLevel::Scalar, semvs::stereo::CpuLevel::Avx2, semvs::stereo::CpuLevel::Avx512]
-        .map(|level| (level.name(), level.is_supported()))
+    [
+        semvs::internals::stereo::CpuLevel::Scalar,
+        semvs::internals::stereo::CpuLevel::Avx2,
+        semvs::internals::stereo::CpuLevel::Avx512,
+    ]
+    .map(|level| (level.name(), level.is_supported()))
 }
 
 #[test]
 fn version_is_a_result_and_tells_the_kernels() {
     let scratch = Scratch::new();
     let version = |level: &str| format!("semvs {}\nkernels: {level}\n", env!("CARGO_PKG_VERSION"));
-    let best = semvs::stereo::CpuLevel::detect().name();
+    let best = semvs::internals::stereo::CpuLevel::detect().name();
     assert_eq!(scratch.semvs("--version").ok().stdout, version(best));
     assert_eq!(scratch.run_with(SEMVS, &["-V"], &[("SEMVS_CPU", "")]).ok().stdout, version(best));
     for (level, is_supported) in cpu_levels() {
@@ -81,7 +85,7 @@ fn kernels_are_chosen_by_a_variable_and_told_in_reports() {
     assert!(out.stderr.contains("with the scalar kernels"), "{}", out.stderr);
     let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
     assert_eq!(report["cpu_level"], "scalar");
-    let best = semvs::stereo::CpuLevel::detect().name();
+    let best = semvs::internals::stereo::CpuLevel::detect().name();
     scratch.semvs(&words.join(" ")).ok();
     let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
     assert_eq!(report["cpu_level"], best);

@@ -177,7 +177,7 @@ fn page_path() -> std::path::PathBuf {
 
 #[test]
 fn every_figure_is_explained() {
-    use semvs::evaluate::{CLOUD_FIGURES, FOLDER_FIGURES, MAP_FIGURES, SCENE_FIGURES};
+    use semvs::internals::evaluate::{CLOUD_FIGURES, FOLDER_FIGURES, MAP_FIGURES, SCENE_FIGURES};
     let page = page();
     let (_, figures) = page.split_once("## Figures").unwrap();
     for (title, catalog) in [

@@ -74,7 +74,7 @@ fn aware_estimation_is_the_same_on_every_processor() {
     };
     let scalar = run("scalar");
     for level in ["avx2", "avx512"] {
-        let level_is_there = level.parse::<semvs::stereo::CpuLevel>().is_ok();
+        let level_is_there = level.parse::<semvs::internals::stereo::CpuLevel>().is_ok();
         assert!(!level_is_there || run(level) == scalar, "{level}");
     }
 }

@@ -15,6 +15,7 @@ mod exact_runs;
 mod exchange;
 mod label_estimation;
 mod labels;
+mod library;
 mod line;
 mod masks;
 mod odd_inputs;

@@ -1,12 +1,12 @@
 //! Depth maps to clouds without fusion, on the bundled scene.
 
 use crate::common::{self, Scratch, facade6};
-use semvs::pipeline::{ConvertJob, LabelJob, Outputs, convert};
-use semvs::progress::Progress;
-use semvs::semantics::ClassRules;
-use semvs::store::cloud::PlyLayout;
-use semvs::store::depth_store::read_depth_map;
-use semvs::store::labels::LabelSources;
+use semvs::internals::pipeline::{ConvertJob, LabelJob, Outputs, convert};
+use semvs::internals::progress::Progress;
+use semvs::internals::semantics::ClassRules;
+use semvs::internals::store::cloud::PlyLayout;
+use semvs::internals::store::depth_store::read_depth_map;
+use semvs::internals::store::labels::LabelSources;
 use semvs_formats::Limits;
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ fn every_depth_becomes_a_point_with_what_its_pixel_has() {
         name => panic!("{name}"),
     });
     let colors = image::open(label_file).unwrap().to_rgb8();
-    let classes = semvs::semantics::ClassTable::builtin("3dom-facade").unwrap();
+    let classes = semvs::internals::semantics::ClassTable::builtin("3dom-facade").unwrap();
     let sky = classes.resolve("sky").unwrap().0;
     let table = classes.colors();
     let (mut i, mut on_sky) = (0, 0);

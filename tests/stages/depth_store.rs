@@ -1,12 +1,12 @@
 //! Depth maps that OpenMVS wrote, held against the scene that they belong to.
 
 use crate::common::{Scratch, facade6};
-use semvs::progress::Progress;
-use semvs::scene::{ImageId, ResolutionOptions};
-use semvs::store::cameras::working_cameras;
-use semvs::store::depth_store::{DepthStore, Existing};
-use semvs::store::import::load_scene;
-use semvs::store::paths::SearchPath;
+use semvs::internals::progress::Progress;
+use semvs::internals::scene::{ImageId, ResolutionOptions};
+use semvs::internals::store::cameras::working_cameras;
+use semvs::internals::store::depth_store::{DepthStore, Existing};
+use semvs::internals::store::import::load_scene;
+use semvs::internals::store::paths::SearchPath;
 use semvs_formats::Limits;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn maps_of_openmvs_belong_to_their_scene_and_only_to_its_size() {
     let full = ResolutionOptions { level: 0, ..HALF };
     let large = working_cameras(&scene, &full, true, &Progress::silent()).unwrap();
     for (i, view) in scene.scene.views.iter().enumerate() {
-        let existing = |id: ImageId, cameras: &[Option<semvs::geometry::Camera>]| {
+        let existing = |id: ImageId, cameras: &[Option<semvs::internals::geometry::Camera>]| {
             store.existing(id, cameras[i].as_ref().unwrap())
         };
         let own = existing(view.id, &cameras);
@@ -54,7 +54,7 @@ fn maps_of_openmvs_are_written_back_byte_for_byte() {
         assert!(valid > estimate.depth.size().area() / 2, "{id}: {valid} depths");
         let name = &estimate.image_name;
         assert!(name.starts_with("images/") || name.contains("/images/"), "{name}");
-        semvs::store::depth_store::write_depth_map(&to.path(id), &estimate, name).unwrap();
+        semvs::internals::store::depth_store::write_depth_map(&to.path(id), &estimate, name).unwrap();
         let bytes = |store: &DepthStore| std::fs::read(store.path(id)).unwrap();
         assert!(bytes(&from) == bytes(&to), "{id}");
     }

@@ -1,11 +1,11 @@
 //! Scores equal those of an independent script (numpy and scipy: one k-d tree, one dilation) on real clouds and maps.
 
 use crate::common::{self, bytes, facade6};
-use semvs::evaluate::{
+use semvs::internals::evaluate::{
     CloudScoreOptions, LabelledPoints, MapScoreOptions, MapScores, cloud_scores, map_scores,
 };
-use semvs::geometry::Size;
-use semvs::scene::{DepthMap, Grid};
+use semvs::internals::geometry::Size;
+use semvs::internals::scene::{DepthMap, Grid};
 use semvs_formats::Limits;
 use semvs_formats::dmap::DepthMapFile;
 use serde_json::Value;

@@ -2,8 +2,10 @@
 
 use crate::common::facade6;
 use crate::openmvs_maps::{depth_maps, neighbor_lists, scene};
-use semvs::depth_filter::{DepthFilterOptions, FilterView, fill_gaps, filter_consistency, remove_speckles};
-use semvs::scene::DepthEstimate;
+use semvs::internals::depth_filter::{
+    DepthFilterOptions, FilterView, fill_gaps, filter_consistency, remove_speckles,
+};
+use semvs::internals::scene::DepthEstimate;
 
 /// Largest relative difference of a depth or confidence: OpenMVS's f32 arithmetic is reproduced, and only
 /// rounding inside maths libraries may differ.

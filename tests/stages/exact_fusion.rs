@@ -3,12 +3,12 @@
 use crate::common::{cloud, facade6, shared};
 use crate::openmvs_maps::{MapsInMemory, points, scene};
 use nalgebra::{Matrix3, Vector3};
-use semvs::evaluate::{Tolerance, compare_clouds};
-use semvs::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
-use semvs::geometry::Roi;
-use semvs::progress::Progress;
-use semvs::scene::{PointCloud, PointSink, PointSource, ResolutionOptions};
-use semvs::store::spool::PointSpool;
+use semvs::internals::evaluate::{Tolerance, compare_clouds};
+use semvs::internals::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
+use semvs::internals::geometry::Roi;
+use semvs::internals::progress::Progress;
+use semvs::internals::scene::{PointCloud, PointSink, PointSource, ResolutionOptions};
+use semvs::internals::store::spool::PointSpool;
 use semvs_formats::ply::Cloud;
 use std::path::Path;
 

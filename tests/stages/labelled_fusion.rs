@@ -2,14 +2,14 @@
 
 use crate::common::{bytes, facade6};
 use crate::openmvs_maps::{MapsInMemory, scene};
-use semvs::evaluate::{CloudScoreOptions, CloudScores, LabelledPoints, cloud_scores};
-use semvs::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
-use semvs::progress::Progress;
-use semvs::scene::{PointCloud, PointSource, ResolutionOptions, ViewIndex};
-use semvs::semantics::{ClassId, ClassPolicy, ClassRules, Consistency, void_borders};
-use semvs::store::cloud::{CloudOptions, WrittenClouds, write_clouds};
-use semvs::store::images::image_size;
-use semvs::store::labels::{LabelRequest, LabelSources, LabelStore, MissingLabels};
+use semvs::internals::evaluate::{CloudScoreOptions, CloudScores, LabelledPoints, cloud_scores};
+use semvs::internals::fusion::{FusionInput, FusionOptions, FusionSummary, fuse};
+use semvs::internals::progress::Progress;
+use semvs::internals::scene::{PointCloud, PointSource, ResolutionOptions, ViewIndex};
+use semvs::internals::semantics::{ClassId, ClassPolicy, ClassRules, Consistency, void_borders};
+use semvs::internals::store::cloud::{CloudOptions, WrittenClouds, write_clouds};
+use semvs::internals::store::images::image_size;
+use semvs::internals::store::labels::{LabelRequest, LabelSources, LabelStore, MissingLabels};
 use semvs_formats::{Limits, ply};
 use std::path::Path;
 use std::sync::Arc;
@@ -35,7 +35,7 @@ impl Labelled {
     fn load(folder: &Path, reference: &Path, label_folder: &str, resolution: ResolutionOptions) -> Self {
         let mvs = scene(&reference.join("scene_dense.mvs"));
         let maps = MapsInMemory::load(reference, folder, &mvs, resolution);
-        let request = |(i, maps): (usize, &semvs::fusion::FusionMaps)| {
+        let request = |(i, maps): (usize, &semvs::internals::fusion::FusionMaps)| {
             let image = folder.join(&maps.estimate.image_name);
             let size = Some(image_size(&image).unwrap());
             LabelRequest { view: ViewIndex(i as u32), image, mask: None, size }
@@ -131,7 +131,7 @@ fn labels_that_decide_nothing_change_nothing() {
     let (labelled, _) = scene.fuse(Some(&rules(Consistency::Off)), 3);
     assert_eq!(plain.len(), labelled.len());
     for (a, b) in plain.iter().zip(labelled.iter()) {
-        let geometry = |p: &semvs::scene::CloudPoint<'_>| {
+        let geometry = |p: &semvs::internals::scene::CloudPoint<'_>| {
             (p.position, p.normal, p.color, p.views.to_vec(), p.weights.to_vec())
         };
         assert_eq!(geometry(&a), geometry(&b));

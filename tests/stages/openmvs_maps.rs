@@ -3,13 +3,13 @@
 use crate::common::bytes;
 use nalgebra::{Matrix3, Vector3};
 use semvs::Result;
-use semvs::fusion::{FusionMaps, FusionView, MapInfo, MapSource};
-use semvs::geometry::{Camera, Size};
-use semvs::scene::{
+use semvs::internals::fusion::{FusionMaps, FusionView, MapInfo, MapSource};
+use semvs::internals::geometry::{Camera, Size};
+use semvs::internals::scene::{
     Calibration, CloudLayout, CloudPoint, DepthEstimate, Grid, ImageId, PointCloud, PointSink,
     ResolutionOptions, ViewIndex,
 };
-use semvs::store::images::load_working_color;
+use semvs::internals::store::images::load_working_color;
 use semvs_formats::dmap::DepthMapFile;
 use semvs_formats::mvs::{self, Scene};
 use semvs_formats::{Limits, ply};

@@ -1,11 +1,11 @@
 //! Loading, view selection and regions of interest against OpenMVS's own outputs.
 
 use crate::common::{bytes, facade6, shared};
-use semvs::geometry::Camera;
-use semvs::progress::Progress;
-use semvs::scene::{NeighborOptions, ResolutionOptions, ViewNeighbors, select_neighbors};
-use semvs::store::cameras::working_cameras;
-use semvs::store::import::{LoadedScene, load_scene};
+use semvs::internals::geometry::Camera;
+use semvs::internals::progress::Progress;
+use semvs::internals::scene::{NeighborOptions, ResolutionOptions, ViewNeighbors, select_neighbors};
+use semvs::internals::store::cameras::working_cameras;
+use semvs::internals::store::import::{LoadedScene, load_scene};
 use semvs_formats::Limits;
 use std::path::Path;
 
@@ -29,7 +29,9 @@ fn assert_same_neighbors(scene: &Path, reference: &Path, resolution: &Resolution
     let close = |a: f32, b: f32| (a - b).abs() <= SCORE_TOLERANCE * b.abs();
     let mut worst = 0.0f32;
     for (i, (view, stored)) in views.iter().zip(&expected.scene.views).enumerate() {
-        let order = |n: &[semvs::scene::Neighbor]| n.iter().map(|n| (n.view, n.points)).collect::<Vec<_>>();
+        let order = |n: &[semvs::internals::scene::Neighbor]| {
+            n.iter().map(|n| (n.view, n.points)).collect::<Vec<_>>()
+        };
         assert_eq!(order(&view.all), order(&stored.neighbors), "view {i}");
         assert!(close(view.avg_depth, stored.avg_depth), "view {i}: {} {}", view.avg_depth, stored.avg_depth);
         for (a, b) in view.all.iter().zip(&stored.neighbors) {
@@ -70,7 +72,7 @@ fn view_selection_equals_openmvs_on_larger_scenes() {
 
 #[test]
 fn densified_scenes_equal_openmvs_to_the_byte() {
-    use semvs::store::export::{interface_archive, write_interface};
+    use semvs::internals::store::export::{interface_archive, write_interface};
     let scratch = tempfile::tempdir().unwrap();
     for name in ["facade16", "fountain_p11"] {
         let scene = shared(&format!("datasets/{name}/scene.mvs"));
@@ -133,7 +135,7 @@ fn one_bad_photograph_drops_its_view_and_strictness_makes_it_an_error() {
 
 #[test]
 fn the_estimated_region_equals_openmvs() {
-    use semvs::scene::{RoiEstimation, estimate_roi};
+    use semvs::internals::scene::{RoiEstimation, estimate_roi};
     // Printed by OpenMVS with six decimals.
     const TOLERANCE: f64 = 1e-6;
     let Some(folder) = shared("reference/tests4") else { return };
@@ -149,7 +151,7 @@ fn the_estimated_region_equals_openmvs() {
 
 #[test]
 fn depth_ranges_equal_those_of_openmvs_maps() {
-    use semvs::scene::SparseInit;
+    use semvs::internals::scene::SparseInit;
     let folder = facade6();
     let loaded = load(&folder.join("scene.mvs"));
     let (cameras, views) = select(&loaded, &resolution(1, 160));

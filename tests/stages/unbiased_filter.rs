@@ -2,8 +2,8 @@
 
 use crate::common::{bytes, facade6};
 use crate::openmvs_maps::{depth_maps, neighbor_lists, scene};
-use semvs::depth_filter::{FilterView, UnbiasedFilterOptions, filter_unbiased};
-use semvs::scene::DepthEstimate;
+use semvs::internals::depth_filter::{FilterView, UnbiasedFilterOptions, filter_unbiased};
+use semvs::internals::scene::DepthEstimate;
 
 /// Relative error of a good depth.
 const GOOD: f32 = 0.005;
