@@ -65,6 +65,25 @@ pub struct SceneSummary {
     pub points: usize,
 }
 
+/// What a run will take, by a model; the programs say it, and nothing depends on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Forecast {
+    /// Depth maps to make.
+    pub maps: usize,
+    /// Columns and rows of the largest.
+    pub size: (u32, u32),
+    /// Whether all have this size.
+    pub is_one_size: bool,
+    /// Source views of each, on the mean.
+    pub sources: usize,
+    /// Threads at work.
+    pub threads: usize,
+    /// Time of every stage that is to come, in order.
+    pub stages: Vec<(Stage, Duration)>,
+    /// Most memory that the run is to take, bytes.
+    pub memory: u64,
+}
+
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -96,6 +115,8 @@ pub enum Event {
         /// Time since the preparation of the images began.
         elapsed: Duration,
     },
+    /// What is to be done is known, and nothing of it is done.
+    Planned(Forecast),
     /// The source views of one reference view.
     Paired {
         /// The reference view.

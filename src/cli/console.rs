@@ -1,6 +1,7 @@
 //! What `semvs` says on stderr while it works: lines, and bars on a terminal.
 
 use super::duration;
+use super::forecast::{self, Remaining};
 use super::one_line::printable;
 use crate::progress::{Event, Listener, Stage};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -43,6 +44,8 @@ pub(crate) struct Console {
     /// Bars are drawn; otherwise every tenth of a stage gets a line.
     draw: bool,
     current: Mutex<Option<(Stage, ProgressBar)>>,
+    /// How long the run still takes, if that was forecast.
+    remaining: Mutex<Option<Remaining>>,
     /// When the last line about steps was printed.
     last_line: Mutex<Option<Instant>>,
 }
@@ -59,6 +62,7 @@ impl Console {
             bars: MultiProgress::new(),
             draw,
             current: Mutex::default(),
+            remaining: Mutex::default(),
             last_line: Mutex::default(),
         }
     }
@@ -83,12 +87,19 @@ impl Console {
         due
     }
 
+    /// What is left of the run, `, about 2 min left`; empty where that is not known.
+    fn left(&self, stage: Stage, done: usize, total: usize) -> String {
+        let remaining = self.remaining.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let left = remaining.as_ref().and_then(|remaining| remaining.at(stage, done, total));
+        left.map_or_else(String::new, |left| format!(", {} left", forecast::about(left)))
+    }
+
     fn draw_steps(&self, stage: Stage, done: usize, total: usize) {
         let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if current.as_ref().is_none_or(|(shown, _)| *shown != stage) {
             let bar = self.bars.add(ProgressBar::new(total as u64));
             if let Ok(style) =
-                ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {elapsed}, {eta} left")
+                ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {elapsed}{prefix}")
             {
                 bar.set_style(style);
             }
@@ -98,6 +109,10 @@ impl Console {
         if let Some((_, bar)) = current.as_ref() {
             // Threads may report out of order.
             bar.set_position(bar.position().max(done as u64));
+            bar.set_prefix(match self.left(stage, done, total) {
+                left if left.is_empty() && done > 0 => format!(", {} left", forecast::about(bar.eta())),
+                left => left,
+            });
             if done == total {
                 bar.finish_and_clear();
                 self.bars.remove(bar);
@@ -122,6 +137,11 @@ impl Listener for Console {
                 self.say(Level::Detail, &line(event));
             }
             Event::Paired { .. } => self.say(Level::All, &line(event)),
+            Event::Planned(forecast) => {
+                *self.remaining.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
+                    Some(Remaining::of(forecast));
+                self.say(Level::Info, &line(event));
+            }
             _ => self.say(Level::Info, &line(event)),
         }
     }
@@ -130,7 +150,7 @@ impl Listener for Console {
         if self.draw {
             self.draw_steps(stage, done, total);
         } else if begins_a_tenth(done, total) && (done == total || self.is_due()) {
-            self.say(Level::Info, &format!("{stage}: {done} of {total}"));
+            self.say(Level::Info, &format!("{stage}: {done} of {total}{}", self.left(stage, done, total)));
         }
     }
 }
@@ -148,6 +168,7 @@ fn line(event: &Event) -> String {
         ),
         Event::ImagesPrepared { images, elapsed } => format!("Images ready: {images} ({})", time(elapsed)),
         Event::ViewsSelected { images, .. } => format!("Images with neighbours: {images}"),
+        Event::Planned(forecast) => forecast::line(forecast),
         Event::Paired { reference, sources } => {
             let sources: Vec<String> = sources.iter().map(ToString::to_string).collect();
             format!("Image {reference} is matched with {}", sources.join(" "))

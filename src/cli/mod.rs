@@ -7,6 +7,7 @@ mod dense_config;
 mod densify_point_cloud;
 mod duration;
 mod exchange_args;
+mod forecast;
 mod interrupt;
 mod label_options;
 mod labels_args;

@@ -3,6 +3,7 @@
 use super::diagnostics::{leave_pictures, leave_project};
 use super::estimate::{Estimation, fitting_maps};
 use super::filter::filter_across_views;
+use super::forecast::forecast;
 use super::fusing::{Fused, fuse_maps, possible};
 use super::ingredients::Recipe;
 use super::inputs::{Classes, check_inputs, named_files};
@@ -83,6 +84,9 @@ fn run(job: &DensifyJob, cpu: CpuLevel, progress: &Progress) -> Result<RunReport
         true => job.fusion,
         false => possible(&job.fusion, prepared.count(), maps, progress)?,
     };
+    if let Some(forecast) = forecast(job, &prepared, &plan, &memory, cpu)? {
+        progress.event(Event::Planned(forecast));
+    }
     let mapped = make_maps(job, &prepared, &store, &plan, &memory, cpu, &mut clock, progress)?;
     let mut report = RunReport {
         scene: job.input.scene.display().to_string(),

@@ -24,6 +24,8 @@ const TEXEL_BYTES: u64 = 7;
 const PLANE_BYTES: u64 = 8;
 /// Bytes per pixel of a view's maps while they are fused.
 const FUSED_BYTES: u64 = 27;
+/// Bytes per pixel of all maps that the points of a cloud take in memory, at most.
+const POINT_BYTES: u64 = 16;
 /// Bytes per pixel of a photograph while it is decoded and scaled.
 const DECODED_BYTES: u64 = 4;
 
@@ -46,6 +48,12 @@ pub(super) struct MemoryPlan {
     pub(super) fusion: u64,
     /// Points kept until the cloud is written; the rest waits in a file.
     pub(super) points: u64,
+    /// What a view takes while it is estimated.
+    view: u64,
+    /// What photographs take while they are decoded.
+    decoded: u64,
+    /// What may be used in all.
+    limit: u64,
 }
 
 /// Least and most memory for depth maps between the passes, where there is enough.
@@ -101,7 +109,21 @@ impl MemoryPlan {
             planes: share(4, in_hand * PLANE_BYTES, OTHERS),
             fusion: (group * 3 / 2).max(FUSION).min(free * 5 / 8).max(group.min(free)),
             points,
+            view: if estimates { one } else { 0 },
+            decoded,
+            limit,
         })
+    }
+
+    /// The most that a run will take by this plan, if all its maps together have `pixels`.
+    pub(super) fn most(&self, pixels: u64) -> u64 {
+        // Those of two passes side by side.
+        let maps = (self.maps as u64).min(2 * pixels * MAP_BYTES);
+        let grays = (self.grays as u64).min(pixels * size_of::<f32>() as u64);
+        let colors = (self.colors as u64).min(pixels * size_of::<[u8; 3]>() as u64);
+        let estimation = self.views_at_once as u64 * self.view + maps + grays;
+        let fusion = self.fusion.min(pixels * FUSED_BYTES) + colors + self.points.min(pixels * POINT_BYTES);
+        (BASE + self.decoded + estimation.max(fusion)).min(self.limit)
     }
 }
 

@@ -15,6 +15,7 @@ mod export_rasters;
 mod fault_tests;
 mod filter;
 mod finished;
+mod forecast;
 mod fuse;
 mod fusing;
 mod images;

@@ -51,6 +51,7 @@ macro_rules! camera_models {
     ($($variant:ident $name:literal $params:literal)*) => {
         /// How a camera projects and distorts.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
         pub enum CameraModel {
             $(#[doc = concat!("`", $name, "`: ", $params)] $variant,)*
         }

@@ -6,6 +6,7 @@ use laz::{LazItemRecordBuilder, LazItemType, LazVlr};
 
 /// An attribute of every point that the record format lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Extra {
     /// `NormalX`, `NormalY`, `NormalZ`, 32-bit real: the names that CloudCompare and PDAL know.
     Normal,

@@ -157,6 +157,8 @@ fn message(event: &Event) -> Option<(i32, String)> {
     Some(match event {
         Event::Warning(text) | Event::Info(text) => (0, printable(text)),
         Event::Detail(text) => (2, printable(text)),
+        // OpenMVS says nothing of the kind.
+        Event::Planned(_) => return None,
         Event::SceneLoaded { scene, elapsed } => (0, scene_lines("loaded", "from", scene, elapsed)),
         Event::ImagesPrepared { images, elapsed } => (
             0,
