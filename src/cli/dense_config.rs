@@ -154,7 +154,10 @@ fn parse(text: &str) -> std::result::Result<(DenseConfig, Vec<String>), String> 
             continue;
         }
         let Some((title, value)) = line.split_once('=') else {
-            return Err(format!("line {number}: '{line}' is not of the form 'Title = value'"));
+            const MOST: usize = 40;
+            let more = if line.chars().count() > MOST { "..." } else { "" };
+            let line: String = line.chars().take(MOST).collect();
+            return Err(format!("line {number}: '{line}{more}' is not of the form 'Title = value'"));
         };
         let (title, value) = (title.trim(), value.trim());
         let bad = |expected: &str| format!("line {number}: '{title}' is '{value}', expected {expected}");

@@ -8,6 +8,7 @@ mod densify_point_cloud;
 mod duration;
 mod exchange_args;
 mod forecast;
+mod given;
 mod interrupt;
 mod label_options;
 mod labels_args;

@@ -1,6 +1,7 @@
 //! The program `semvs`.
 
 use super::console::{Console, Level};
+use super::given;
 use super::listen::Recorder;
 use super::one_line::{one_line, printable};
 use super::resolve::cpu;
@@ -17,13 +18,14 @@ use std::sync::Arc;
 pub fn semvs(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let words: Vec<OsString> = words.into_iter().collect();
     let failure = failure_of(&words);
+    let help = help_of(&words);
     let matches = match SemvsArgs::command().try_get_matches_from(words) {
         Ok(matches) => matches,
-        Err(error) => return refuse(&error, failure),
+        Err(error) => return refuse(&error, failure, &help),
     };
     let args = match SemvsArgs::from_arg_matches(&matches) {
         Ok(args) => args,
-        Err(error) => return refuse(&error, failure),
+        Err(error) => return refuse(&error, failure, &help),
     };
     let console = Console::new(Level::of(args.verbose, args.quiet));
     let recorder = Recorder::before(Arc::new(console));
@@ -48,8 +50,21 @@ fn failure_of(words: &[OsString]) -> ExitCode {
     }
 }
 
+/// What to type for the help that `words` call for: that of a command, if they name one.
+fn help_of(words: &[OsString]) -> String {
+    let mut command = SemvsArgs::command();
+    let mut typed = "semvs".to_owned();
+    for word in words.iter().skip(1).filter_map(|word| word.to_str()) {
+        let Some(next) = command.find_subcommand(word) else { break };
+        typed = format!("{typed} {}", next.get_name());
+        command = next.clone();
+    }
+    format!("{typed} --help")
+}
+
 fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crate::Result<ExitCode> {
     let Some((_, typed)) = matches.subcommand() else { return Ok(ExitCode::SUCCESS) };
+    given::check(&args.command)?;
     match &args.command {
         Command::Compare(args) => return commands::compare(args),
         Command::Densify(args) => commands::densify(args, typed, recorder),
@@ -67,7 +82,7 @@ fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crat
 }
 
 /// Help and version are results; anything else is a mistake on the command line.
-fn refuse(error: &clap::Error, failure: ExitCode) -> ExitCode {
+fn refuse(error: &clap::Error, failure: ExitCode, help: &str) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp => {
             print(&error.render().to_string());
@@ -88,7 +103,7 @@ fn refuse(error: &clap::Error, failure: ExitCode) -> ExitCode {
             failure
         }
         _ => {
-            complain(&format!("error: {}; see semvs --help\n", printable(&one_line(error))));
+            complain(&format!("error: {}; see {help}\n", printable(&one_line(error))));
             failure
         }
     }

@@ -134,3 +134,30 @@ fn most_sources(job: &SceneJob) -> usize {
         typed => typed.min(MAX_NEIGHBORS.max(job.neighbors.max_views)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_pixels_take_more_memory_up_to_the_limit() {
+        let plan = MemoryPlan {
+            views_at_once: 2,
+            maps: 176 << 20,
+            grays: 64 << 20,
+            colors: 64 << 20,
+            fusion: 256 << 20,
+            points: 64 << 20,
+            view: 75 << 20,
+            decoded: 2 << 20,
+            limit: 1 << 30,
+        };
+        let most: Vec<u64> = (0..32).map(|i| plan.most(1 << i)).collect();
+        assert!(most.is_sorted(), "{most:?}");
+        assert!(most[0] > 200 << 20 && most[31] <= plan.limit, "{most:?}");
+        let tight = MemoryPlan { limit: 300 << 20, ..plan };
+        assert_eq!(tight.most(1 << 31), 300 << 20);
+        let fuses = MemoryPlan { view: 0, maps: 0, grays: 0, ..plan };
+        assert!(fuses.most(1 << 20) < plan.most(1 << 20));
+    }
+}

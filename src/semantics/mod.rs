@@ -17,6 +17,7 @@ mod vote;
 pub use classes::{Class, ClassId, ClassTable};
 pub use consensus::{Consensus, ConsensusOptions, Witness, border_distance, label_consensus};
 pub use label_map::{nearest_labels, void_borders};
+pub(crate) use names::nearest;
 pub use policy::{Agreement, ClassPolicy, ClassRules, Consistency, LabelEstimation, Voters};
 pub use regions::{PlanarRegion, PlanePrior, planar_regions};
 pub use render::{LabelledSurface, point_radii, render_labels};

@@ -42,8 +42,8 @@ impl AtomicFile {
         }
         let folder = folder_of(path);
         create_folder(folder)?;
-        let named =
-            temporary_beside(path, folder).map_err(|e| Error::io(path, "write (its folder refuses)", e))?;
+        let named = temporary_beside(path, folder)
+            .map_err(|e| locked(path, folder, e, "write (its folder refuses)"))?;
         let (file, temporary) = named.into_parts();
         // Tells those who sweep that it is in use; where there are no locks nobody sweeps.
         let _ = file.try_lock();
@@ -169,7 +169,24 @@ pub(crate) fn create_folder(folder: &Path) -> Result<()> {
         let what = format!("cannot create the folder {}: a file is in the way; move it", folder.display());
         return Err(Error::content(file, what));
     }
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create folder", e))
+    let above = folder.ancestors().skip(1).find(|a| a.is_dir()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).map_err(|e| locked(folder, above, e, "create folder"))
+}
+
+/// What to do when `folder` may not be written in, which `path` needs; else what the system says.
+fn locked(path: &Path, folder: &Path, error: std::io::Error, action: &'static str) -> Error {
+    use std::io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
+    match error.kind() {
+        PermissionDenied | ReadOnlyFilesystem => Error::content(
+            path,
+            format!(
+                "cannot {}: {} may not be written in; choose another place (-o, -w), or change its permissions",
+                action.split(" (").next().unwrap_or_default(),
+                std::path::absolute(folder).as_deref().unwrap_or(folder).display()
+            ),
+        ),
+        _ => Error::io(path, action, error),
+    }
 }
 
 /// Brings the names in `folder` to the medium, where the system can.

@@ -1,6 +1,8 @@
 //! Finding and reading the label maps of a scene's views.
 
 use super::byte_cache::ByteCache;
+pub use super::label_names::candidate_files;
+use super::label_names::{label_names, looked_for};
 use super::label_png::LabelReader;
 pub use super::label_png::{UnknownLabel, grey_ids};
 use super::paths::is_same_file;
@@ -50,7 +52,16 @@ impl LabelSources {
 
     fn check_folder(&self) -> Result<()> {
         match self.label_path.as_deref().filter(|folder| !folder.is_dir()) {
-            Some(folder) => Err(Error::content(folder, "no such folder of label maps (--label-path)")),
+            Some(file) if file.exists() => {
+                Err(Error::content(file, "this is a file; --label-path takes the folder of the label maps"))
+            }
+            Some(folder) => Err(Error::content(
+                folder,
+                format!(
+                    "no such folder of label maps (--label-path); for DSC1.jpg it holds {}",
+                    label_names(Path::new("DSC1.jpg"))
+                ),
+            )),
             None => Ok(()),
         }
     }
@@ -247,26 +258,6 @@ fn read_text(path: &Path, limits: Limits) -> Result<String> {
         .map_err(|e| Error::content(path, format!("a class table is UTF-8 text: {}", e.utf8_error())))
 }
 
-/// The names under which the label map of `request` is looked for, in order.
-pub fn candidate_files(label_path: Option<&Path>, request: &LabelRequest) -> Vec<PathBuf> {
-    let file = request.image.file_name().unwrap_or_default().to_string_lossy();
-    let stem = request.image.file_stem().unwrap_or_default().to_string_lossy();
-    let mut candidates = Vec::new();
-    if let Some(folder) = label_path {
-        let names = [
-            format!("{stem}.png"),
-            format!("{file}.png"),
-            format!("{stem}_l.png"),
-            format!("{stem}.label.png"),
-            format!("{stem}.mask.png"),
-        ];
-        candidates.extend(names.map(|name| folder.join(name)));
-    }
-    candidates.extend(request.mask.clone());
-    candidates.push(request.image.with_file_name(format!("{stem}.mask.png")));
-    candidates
-}
-
 /// The first candidate that is there; a photograph in the folder of label maps is no label map.
 fn found_file(sources: &LabelSources, request: &LabelRequest) -> Option<PathBuf> {
     let candidates = candidate_files(sources.label_path.as_deref(), request);
@@ -290,8 +281,6 @@ fn find_all(
     warn_of_shared(views, &files, progress);
     let Some(first) = without.first() else { return Ok(files) };
     if sources.missing == MissingLabels::Refuse || files.is_empty() {
-        let tried = candidate_files(sources.label_path.as_deref(), first);
-        let tried: Vec<String> = tried.iter().map(|path| path.display().to_string()).collect();
         let which = match without.len() {
             n if n == views.len() && n > 1 => "no image has a label map".to_owned(),
             1 => format!("no label map for {}", first.image.display()),
@@ -302,9 +291,8 @@ fn find_all(
         let remedy =
             if files.is_empty() { "" } else { "; --missing-labels void takes such images as unlabelled" };
         return Err(Error::invalid(format!(
-            "{which}; for {} these were tried: {}{remedy}",
-            first.image.display(),
-            tried.join(", ")
+            "{which}: {}{remedy}",
+            looked_for(sources.label_path.as_deref(), first)
         )));
     }
     for request in without {

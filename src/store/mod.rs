@@ -20,6 +20,7 @@ mod hostile_image_tests;
 pub mod images;
 pub mod import;
 mod jpeg;
+pub(crate) mod label_names;
 mod label_png;
 pub mod label_write;
 pub mod labels;

@@ -13,6 +13,7 @@ mod compare;
 mod corners;
 mod exact_runs;
 mod exchange;
+mod first_run;
 mod label_estimation;
 mod labels;
 mod library;

@@ -5,6 +5,7 @@ use crate::cli::resolve;
 use crate::error::{Error, Result};
 use crate::pipeline::{self, CheckLabelsJob, RenderLabelsJob};
 use crate::progress::Progress;
+use crate::store::label_names::label_names;
 use crate::store::labels::LabelSources;
 use std::path::Path;
 
@@ -39,6 +40,14 @@ fn check(args: &CheckLabelsArgs, progress: &Progress) -> Result<()> {
     crate::cli::print(&text);
     match found.faults {
         0 => Ok(()),
+        _ if found.views.iter().all(|view| view.file.is_none()) => {
+            let place = args.label_path.as_deref().map(|folder| format!(" in {}", folder.display()));
+            Err(Error::invalid(format!(
+                "no image has a label map; that of DSC1.jpg is {}{}",
+                label_names(Path::new("DSC1.jpg")),
+                place.as_deref().unwrap_or(" in the folder that --label-path names"),
+            )))
+        }
         n => Err(Error::invalid(format!(
             "{n} of {} label maps are missing or cannot be used; see above",
             found.views.len()

@@ -48,7 +48,7 @@ impl Workspace {
         let places = [root.join("sparse"), root.join("sparse/0"), root.to_owned()];
         let Some(sparse) = places.into_iter().find(|place| Model::encoding_in(place).is_some()) else {
             let what = "no COLMAP workspace: cameras, images and points3D as .bin or .txt are needed in it or in its \
-                        sparse/ folder";
+                        sparse/ folder; give the output folder of `colmap image_undistorter`, or an .mvs file";
             return Err(Error::content(root, what));
         };
         let above = |levels: usize| {
@@ -65,7 +65,9 @@ impl Workspace {
         let Some(images) = found else {
             let what = match images {
                 Some(images) => format!("{}: no such folder of images", images.display()),
-                None => "no images/ folder in or beside it; say where the undistorted images are".to_owned(),
+                None => "no images/ folder in or beside it: give the output folder of `colmap image_undistorter`, or make a scene \
+                         with semvs import --image-path DIR"
+                    .to_owned(),
             };
             return Err(Error::content(root, what));
         };
