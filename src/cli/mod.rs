@@ -15,6 +15,8 @@ mod labels_args;
 mod listen;
 mod one_line;
 mod options;
+#[cfg(test)]
+mod options_page_tests;
 mod page_args;
 mod resolve;
 mod semvs;

@@ -1,7 +1,7 @@
 //! The program `DensifyPointCloud`: OpenMVS's command line before this library's pipeline.
 
 mod actions;
-mod args;
+pub(super) mod args;
 mod config_file;
 mod front;
 mod help;
