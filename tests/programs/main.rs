@@ -14,6 +14,7 @@ mod corners;
 mod exact_runs;
 mod exchange;
 mod first_run;
+mod json_outputs;
 mod label_estimation;
 mod labels;
 mod library;
