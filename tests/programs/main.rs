@@ -11,6 +11,7 @@ mod colmap;
 mod command_line;
 mod compare;
 mod corners;
+mod docs;
 mod exact_runs;
 mod exchange;
 mod first_run;
