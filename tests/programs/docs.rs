@@ -343,6 +343,60 @@ fn every_command_runs() {
     assert!(ran > 40, "{ran}");
 }
 
+/// Options of other programs that pages name.
+const FOREIGN: &[&str] = &[
+    "--PatchMatchStereo",
+    "--bench",
+    "--end-with",
+    "--min-num-features",
+    "--name",
+    "--open",
+    "--palette",
+    "--pc-quality",
+    "--release",
+    "--test",
+];
+
+/// Options and commands that are named within a text exist: the help texts and the page about options list them.
+#[test]
+fn every_option_and_command_that_is_named_exists() {
+    let golden = std::fs::read_dir(root().join("tests/golden")).unwrap();
+    let mut listed: String =
+        golden.map(|entry| std::fs::read_to_string(entry.unwrap().path()).unwrap()).collect();
+    listed.push_str(&text(Path::new("docs/reference/options.md")));
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    let options = |text: &str| -> Vec<String> {
+        let starts = text.match_indices("--").filter(|(at, _)| !text[..*at].ends_with(is_part));
+        let words = starts.map(|(at, _)| text[at..].chars().take_while(|c| is_part(*c)).collect::<String>());
+        words.filter(|word| word.len() > 3).collect()
+    };
+    let known = options(&listed);
+    let (mut problems, mut named) = (String::new(), 0);
+    for page in pages() {
+        let own = text(&page);
+        for (line, prose) in taken_apart(&own).1 {
+            for code in prose.split('`').skip(1).step_by(2) {
+                let command = code.strip_prefix("semvs ").and_then(|rest| rest.split_whitespace().next());
+                let command = command.filter(|word| word.chars().all(|c| c.is_ascii_lowercase()));
+                for option in options(code) {
+                    named += 1;
+                    if !known.contains(&option) && !FOREIGN.contains(&option.as_str()) {
+                        let _ = writeln!(problems, "{}:{line}: there is no {option}", page.display());
+                    }
+                }
+                if let Some(command) = command
+                    && !listed.contains(&format!("semvs {command} "))
+                {
+                    let _ = writeln!(problems, "{}:{line}: there is no command {command}", page.display());
+                }
+            }
+        }
+    }
+    println!("{named} options are named and exist");
+    assert!(problems.is_empty(), "\n{problems}");
+    assert!(named > 300, "{named}");
+}
+
 /// The texts of all source files, with what is split over lines joined.
 fn sources() -> String {
     let mut all = String::new();
