@@ -4,7 +4,9 @@ use crate::busy::time;
 use crate::scene::{maps, problem};
 use criterion::{Criterion, Throughput};
 use semvs::internals::scene::ViewIndex;
-use semvs::internals::stereo::{CpuLevel, SourcePlanes, StereoOptions, estimate as estimate_view, refine_geometric};
+use semvs::internals::stereo::{
+    CpuLevel, SourcePlanes, StereoOptions, estimate as estimate_view, refine_geometric,
+};
 use std::sync::Arc;
 
 pub(crate) fn estimate(c: &mut Criterion) {

@@ -371,3 +371,8 @@ pub(crate) fn cpu() -> Result<CpuLevel> {
         _ => Ok(CpuLevel::detect()),
     }
 }
+
+/// The line of `--version` about the kernels.
+pub(crate) fn kernels(level: CpuLevel) -> String {
+    format!("kernels: {}\n", level.name())
+}

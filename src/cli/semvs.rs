@@ -4,9 +4,10 @@ use super::console::{Console, Level};
 use super::given;
 use super::listen::Recorder;
 use super::one_line::{one_line, printable};
-use super::resolve::cpu;
+use super::resolve::{cpu, kernels};
 use super::semvs_args::{Command, SemvsArgs};
 use super::{commands, complain, exit_code, print};
+use crate::report::build;
 use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use std::ffi::OsString;
@@ -90,7 +91,7 @@ fn refuse(error: &clap::Error, failure: ExitCode, help: &str) -> ExitCode {
         }
         ErrorKind::DisplayVersion => match cpu() {
             Ok(level) => {
-                print(&format!("{}kernels: {}\n", error.render(), level.name()));
+                print(&format!("semvs {}\n{}", build(), kernels(level)));
                 ExitCode::SUCCESS
             }
             Err(error) => {

@@ -1,5 +1,6 @@
 //! What a run did: tables and a page with pictures for people, JSON for programs.
 
+mod build;
 mod classes;
 mod label_check;
 mod page;
@@ -8,6 +9,7 @@ mod run;
 mod table;
 mod viewer_points;
 
+pub use build::{VERSION, build, commit, with_commit};
 pub use classes::{ClassRow, class_table, fill_shares};
 pub use label_check::{CheckedView, ClassName, LabelCheck};
 pub use page::{

@@ -22,7 +22,7 @@ pub struct ReportPage {
     pub title: String,
     /// Program that ran; empty = unknown.
     pub program: String,
-    /// Its version.
+    /// Its version and commit.
     pub version: String,
     /// Instruction set of the estimator's kernels.
     pub cpu_level: Option<String>,

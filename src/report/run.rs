@@ -1,5 +1,6 @@
 //! A whole run as JSON.
 
+use super::build::{VERSION, commit};
 use super::classes::{ClassRow, class_table};
 use super::table::{Align, Table, grouped};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -12,6 +13,8 @@ pub struct RunReport {
     pub program: String,
     /// Its version.
     pub version: String,
+    /// The commit that it is built from, twelve digits; `None` = not known.
+    pub commit: Option<String>,
     /// Instruction set of the estimator's kernels; `None` = nothing is estimated.
     pub cpu_level: Option<String>,
     /// The scene as given on the command line.
@@ -103,6 +106,13 @@ pub struct OutputReport {
 }
 
 impl RunReport {
+    /// Says that `program` of this build ran.
+    pub fn of_this_build(&mut self, program: &str) {
+        program.clone_into(&mut self.program);
+        VERSION.clone_into(&mut self.version);
+        self.commit = commit().map(str::to_owned);
+    }
+
     /// Indented JSON with a final newline; keys in the order of the fields above.
     ///
     /// # Errors
@@ -143,6 +153,7 @@ mod tests {
         RunReport {
             program: "semvs densify".into(),
             version: "0.1.0".into(),
+            commit: Some("2078195a0b1c".into()),
             cpu_level: Some("avx2".into()),
             scene: "scene.mvs".into(),
             options: [("number-views-fuse".to_owned(), serde_json::json!(2))].into_iter().collect(),

@@ -61,7 +61,9 @@ fn cpu_levels() -> [(&'static str, bool); 3] {
 #[test]
 fn version_is_a_result_and_tells_the_kernels() {
     let scratch = Scratch::new();
-    let version = |level: &str| format!("semvs {}\nkernels: {level}\n", env!("CARGO_PKG_VERSION"));
+    let build = semvs::internals::report::build();
+    assert!(build.starts_with(env!("CARGO_PKG_VERSION")), "{build}");
+    let version = |level: &str| format!("semvs {build}\nkernels: {level}\n");
     let best = semvs::internals::stereo::CpuLevel::detect().name();
     assert_eq!(scratch.semvs("--version").ok().stdout, version(best));
     assert_eq!(scratch.run_with(SEMVS, &["-V"], &[("SEMVS_CPU", "")]).ok().stdout, version(best));
@@ -86,6 +88,38 @@ fn kernels_are_chosen_by_a_variable_and_told_in_reports() {
     let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
     assert_eq!(report["cpu_level"], "scalar");
     let best = semvs::internals::stereo::CpuLevel::detect().name();
+    #[test]
+    fn the_commit_is_that_of_the_working_tree() {
+        let git = std::process::Command::new("git")
+            .args(["rev-parse", "--show-toplevel", "HEAD"])
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output();
+        let told = git.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+        match told.lines().collect::<Vec<_>>()[..] {
+            [top, head] if Path::new(top) == Path::new(env!("CARGO_MANIFEST_DIR")) => {
+                assert_eq!(semvs::internals::report::commit(), Some(&head[..12]));
+            }
+            _ => println!("skipped: not in a working tree of git"),
+        }
+    }
+
+    #[test]
+    fn the_drop_in_tells_its_version_and_leaves_no_log() {
+        let scratch = Scratch::new();
+        let out = scratch.densify_point_cloud("--version").ok();
+        let best = semvs::internals::stereo::CpuLevel::detect().name();
+        let expected = format!(
+            "semvs {}, DensifyPointCloud as of OpenMVS 2.3.0\nkernels: {best}\n",
+            semvs::internals::report::build()
+        );
+        assert_eq!(out.stdout, expected);
+        let out = scratch.run_with(DENSIFY, &["--version"], &[("SEMVS_CPU", "sse9")]);
+        out.fails_naming(&["SEMVS_CPU", "sse9"]);
+        assert_eq!(scratch.files(), Vec::<String>::new());
+        // What is short for an option of OpenMVS stays so.
+        scratch.densify_point_cloud("--ver 1 nothing.mvs").fails_naming(&["nothing.mvs"]);
+    }
+
     scratch.semvs(&words.join(" ")).ok();
     let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
     assert_eq!(report["cpu_level"], best);
@@ -97,6 +131,8 @@ fn kernels_are_chosen_by_a_variable_and_told_in_reports() {
 
 #[test]
 fn unknown_kernels_are_one_line_before_any_work() {
+    assert_eq!(report["version"], semvs::internals::report::VERSION);
+    assert_eq!(report["commit"].as_str(), semvs::internals::report::commit());
     let scratch = Scratch::facade6();
     let before = scratch.files();
     let unknown = [("SEMVS_CPU", "sse9")];

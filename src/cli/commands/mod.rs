@@ -159,8 +159,7 @@ fn conclude(
     recorder: &Recorder,
     outputs: &Outputs,
 ) -> Result<RunReport> {
-    report.program = program.to_owned();
-    report.version = env!("CARGO_PKG_VERSION").to_owned();
+    report.of_this_build(program);
     report.options = options;
     report.warnings = recorder.warnings();
     if let Some(path) = &outputs.report_html {

@@ -12,6 +12,9 @@ pub(crate) struct DropInArgs {
     /// Print this list
     #[arg(short, long, action = ArgAction::SetTrue)]
     pub(crate) help: bool,
+    /// Print the version and the instruction set that the kernels use, and exit
+    #[arg(long, action = ArgAction::SetTrue)]
+    pub(crate) version: bool,
     /// File of options, "name = value" per line, in the working folder
     #[arg(short, long, value_name = "FILE", default_value = "DensifyPointCloud.cfg")]
     pub(crate) config_file: PathBuf,
@@ -160,6 +163,7 @@ pub(crate) const BEYOND: &[&str] = &[
     "force",
     "strict-openmvs",
     "estimate-segmentation",
+    "version",
 ];
 
 /// All options for the tokenizer.

@@ -14,7 +14,7 @@ use crate::cli::resolve::{self, Resolver};
 use crate::cli::values::{openmvs_path, under};
 use crate::error::{Error, Result};
 use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
-use crate::report::{RunReport, class_table};
+use crate::report::{RunReport, build, class_table};
 use crate::stereo::Quality;
 use crate::store::atomic::create_folder;
 use crate::store::cloud::{CloudFormat, PlyLayout};
@@ -36,6 +36,15 @@ pub fn densify_point_cloud(words: impl IntoIterator<Item = OsString>) -> ExitCod
         Ok(typing) => typing,
         Err(error) => return fail(None, &error),
     };
+    if typing.args.version {
+        return match resolve::cpu() {
+            Ok(level) => {
+                crate::cli::print(&format!("{}\n{}", title(), resolve::kernels(level)));
+                ExitCode::SUCCESS
+            }
+            Err(error) => fail(None, &error.to_string()),
+        };
+    }
     let folder = typing.args.shared.run.working_folder.as_deref().map(openmvs_path).unwrap_or_default();
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
     let log = create_folder(here).and_then(|()| Log::create(here, typing.args.verbosity));
@@ -43,7 +52,7 @@ pub fn densify_point_cloud(words: impl IntoIterator<Item = OsString>) -> ExitCod
         Ok(log) => Arc::new(log),
         Err(error) => return fail(None, &error.to_string()),
     };
-    log.line(0, &format!("semvs {}, DensifyPointCloud as of OpenMVS 2.3.0", env!("CARGO_PKG_VERSION")));
+    log.line(0, &title());
     let typed: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
     log.line(0, &format!("Command line: DensifyPointCloud {}", typed.join(" ")));
     if typing.args.help {
@@ -68,6 +77,11 @@ pub fn densify_point_cloud(words: impl IntoIterator<Item = OsString>) -> ExitCod
             exit_code(&error)
         }
     }
+}
+
+/// The first line of the log.
+fn title() -> String {
+    format!("semvs {}, DensifyPointCloud as of OpenMVS 2.3.0", build())
 }
 
 /// Says what went wrong.
@@ -223,8 +237,7 @@ fn conclude(mut report: RunReport, job: &DensifyJob, typing: &Typing, log: &Log)
         class_table(&report.classes).lines().for_each(|line| log.line(0, line));
     }
     if let Some(path) = &job.outputs.report {
-        report.program = "DensifyPointCloud".to_owned();
-        report.version = env!("CARGO_PKG_VERSION").to_owned();
+        report.of_this_build("DensifyPointCloud");
         report.options = typing.options.clone();
         effective::resolve(
             &mut report.options,

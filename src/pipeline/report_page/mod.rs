@@ -10,7 +10,7 @@ use super::labels_check::requests_of;
 use super::record::with_threads;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::report::{BARS, PageClass, PageView, ReportPage, RunReport, add_to};
+use crate::report::{BARS, PageClass, PageView, ReportPage, RunReport, add_to, build, with_commit};
 use crate::semantics::ClassTable;
 use crate::store::atomic::{check_writable, write_file};
 use crate::store::cloud::CloudFormat;
@@ -180,7 +180,10 @@ fn run(job: &ReportPageJob, progress: &Progress) -> Result<WrittenPage> {
         cloud,
         scene: if run.scene.is_empty() { job.scene.display().to_string() } else { run.scene },
         program: run.program,
-        version: if run.version.is_empty() { env!("CARGO_PKG_VERSION").to_owned() } else { run.version },
+        version: match run.version.is_empty() {
+            true => build(),
+            false => with_commit(&run.version, run.commit.as_deref()),
+        },
         cpu_level: run.cpu_level,
         seconds: run.seconds,
         cpu_seconds: run.cpu_seconds,
