@@ -9,6 +9,7 @@ mod duration;
 mod exchange_args;
 mod forecast;
 mod given;
+mod install_args;
 mod interrupt;
 mod label_options;
 mod labels_args;

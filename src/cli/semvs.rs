@@ -68,6 +68,10 @@ fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crat
     given::check(&args.command)?;
     match &args.command {
         Command::Compare(args) => return commands::compare(args),
+        Command::Completions(args) => {
+            commands::completions(args);
+            Ok(())
+        }
         Command::Densify(args) => commands::densify(args, typed, recorder),
         Command::Fuse(args) => commands::fuse(args, typed, recorder),
         Command::Convert(args) => commands::convert(args, &recorder.progress()),
@@ -78,6 +82,8 @@ fn run(args: &SemvsArgs, matches: &ArgMatches, recorder: &Arc<Recorder>) -> crat
         Command::Labels(args) => commands::labels(args, &recorder.progress()),
         Command::Report(args) => commands::report(args, &recorder.progress()),
         Command::Preview(args) => commands::preview(args, &recorder.progress()),
+        Command::Demo(args) => commands::demo(args, recorder),
+        Command::Man(args) => commands::man(args),
     }?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,7 @@
 //! The command line of `semvs`, as typed.
 
 use super::exchange_args::{ExportArgs, ImportArgs};
+use super::install_args::{CompletionsArgs, DemoArgs, ManArgs};
 use super::label_options::{CloudForms, LabelInput};
 use super::labels_args::LabelsArgs;
 use super::options::SharedOptions;
@@ -60,6 +61,9 @@ pub(crate) enum Command {
     Labels(LabelsArgs),
     Report(ReportArgs),
     Preview(PreviewArgs),
+    Demo(DemoArgs),
+    Completions(CompletionsArgs),
+    Man(ManArgs),
 }
 
 /// Make a dense cloud from a scene: depth maps, filters, fusion

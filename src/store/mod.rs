@@ -8,6 +8,7 @@ pub mod cloud;
 mod cloud_names;
 mod cloud_output;
 pub mod colmap;
+pub(crate) mod demo_scene;
 mod depth_map;
 pub mod depth_store;
 pub mod diagnostics;

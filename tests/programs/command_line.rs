@@ -31,8 +31,20 @@ fn help_is_as_agreed() {
     let scratch = Scratch::new();
     golden("semvs.txt", &scratch.semvs("--help").ok().stdout);
     for command in [
-        "densify", "fuse", "convert", "import", "export", "inspect", "evaluate", "compare", "labels",
-        "report", "preview",
+        "densify",
+        "fuse",
+        "convert",
+        "import",
+        "export",
+        "inspect",
+        "evaluate",
+        "compare",
+        "labels",
+        "report",
+        "preview",
+        "demo",
+        "completions",
+        "man",
     ] {
         let help = scratch.semvs(&format!("{command} --help")).ok().stdout;
         golden(&format!("semvs-{command}.txt"), &help);
@@ -77,6 +89,38 @@ fn version_is_a_result_and_tells_the_kernels() {
 }
 
 #[test]
+fn the_commit_is_that_of_the_working_tree() {
+    let git = std::process::Command::new("git")
+        .args(["rev-parse", "--show-toplevel", "HEAD"])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output();
+    let told = git.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+    match told.lines().collect::<Vec<_>>()[..] {
+        [top, head] if Path::new(top) == Path::new(env!("CARGO_MANIFEST_DIR")) => {
+            assert_eq!(semvs::internals::report::commit(), Some(&head[..12]));
+        }
+        _ => println!("skipped: not in a working tree of git"),
+    }
+}
+
+#[test]
+fn the_drop_in_tells_its_version_and_leaves_no_log() {
+    let scratch = Scratch::new();
+    let out = scratch.densify_point_cloud("--version").ok();
+    let best = semvs::internals::stereo::CpuLevel::detect().name();
+    let expected = format!(
+        "semvs {}, DensifyPointCloud as of OpenMVS 2.3.0\nkernels: {best}\n",
+        semvs::internals::report::build()
+    );
+    assert_eq!(out.stdout, expected);
+    let out = scratch.run_with(DENSIFY, &["--version"], &[("SEMVS_CPU", "sse9")]);
+    out.fails_naming(&["SEMVS_CPU", "sse9"]);
+    assert_eq!(scratch.files(), Vec::<String>::new());
+    // What is short for an option of OpenMVS stays so.
+    scratch.densify_point_cloud("--ver 1 nothing.mvs").fails_naming(&["nothing.mvs"]);
+}
+
+#[test]
 fn kernels_are_chosen_by_a_variable_and_told_in_reports() {
     let scratch = Scratch::facade6();
     let words = format!(
@@ -87,39 +131,9 @@ fn kernels_are_chosen_by_a_variable_and_told_in_reports() {
     assert!(out.stderr.contains("with the scalar kernels"), "{}", out.stderr);
     let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
     assert_eq!(report["cpu_level"], "scalar");
+    assert_eq!(report["version"], semvs::internals::report::VERSION);
+    assert_eq!(report["commit"].as_str(), semvs::internals::report::commit());
     let best = semvs::internals::stereo::CpuLevel::detect().name();
-    #[test]
-    fn the_commit_is_that_of_the_working_tree() {
-        let git = std::process::Command::new("git")
-            .args(["rev-parse", "--show-toplevel", "HEAD"])
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .output();
-        let told = git.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
-        match told.lines().collect::<Vec<_>>()[..] {
-            [top, head] if Path::new(top) == Path::new(env!("CARGO_MANIFEST_DIR")) => {
-                assert_eq!(semvs::internals::report::commit(), Some(&head[..12]));
-            }
-            _ => println!("skipped: not in a working tree of git"),
-        }
-    }
-
-    #[test]
-    fn the_drop_in_tells_its_version_and_leaves_no_log() {
-        let scratch = Scratch::new();
-        let out = scratch.densify_point_cloud("--version").ok();
-        let best = semvs::internals::stereo::CpuLevel::detect().name();
-        let expected = format!(
-            "semvs {}, DensifyPointCloud as of OpenMVS 2.3.0\nkernels: {best}\n",
-            semvs::internals::report::build()
-        );
-        assert_eq!(out.stdout, expected);
-        let out = scratch.run_with(DENSIFY, &["--version"], &[("SEMVS_CPU", "sse9")]);
-        out.fails_naming(&["SEMVS_CPU", "sse9"]);
-        assert_eq!(scratch.files(), Vec::<String>::new());
-        // What is short for an option of OpenMVS stays so.
-        scratch.densify_point_cloud("--ver 1 nothing.mvs").fails_naming(&["nothing.mvs"]);
-    }
-
     scratch.semvs(&words.join(" ")).ok();
     let report: serde_json::Value = serde_json::from_slice(&scratch.read("r.json")).unwrap();
     assert_eq!(report["cpu_level"], best);
@@ -131,8 +145,6 @@ fn kernels_are_chosen_by_a_variable_and_told_in_reports() {
 
 #[test]
 fn unknown_kernels_are_one_line_before_any_work() {
-    assert_eq!(report["version"], semvs::internals::report::VERSION);
-    assert_eq!(report["commit"].as_str(), semvs::internals::report::commit());
     let scratch = Scratch::facade6();
     let before = scratch.files();
     let unknown = [("SEMVS_CPU", "sse9")];

@@ -15,6 +15,7 @@ mod docs;
 mod exact_runs;
 mod exchange;
 mod first_run;
+mod install;
 mod json_outputs;
 mod label_estimation;
 mod labels;

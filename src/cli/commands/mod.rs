@@ -1,7 +1,9 @@
 //! The commands of `semvs`: from typed options to a job, and from its outcome to text.
 
 mod compare;
+mod completions;
 mod convert;
+mod demo;
 mod densify;
 pub(crate) mod effective;
 mod evaluate;
@@ -10,11 +12,14 @@ mod fuse;
 mod import;
 mod inspect;
 mod labels;
+mod man;
 mod preview;
 mod report;
 
 pub(crate) use compare::{INCOMPARABLE, compare};
+pub(crate) use completions::completions;
 pub(crate) use convert::convert;
+pub(crate) use demo::demo;
 pub(crate) use densify::densify;
 pub(crate) use evaluate::evaluate;
 pub(crate) use export::export;
@@ -22,6 +27,7 @@ pub(crate) use fuse::fuse;
 pub(crate) use import::import;
 pub(crate) use inspect::inspect;
 pub(crate) use labels::labels;
+pub(crate) use man::man;
 pub(crate) use preview::preview;
 pub(crate) use report::report;
 

@@ -11,4 +11,5 @@ mod refusals;
 mod run;
 mod tokens;
 
+pub(crate) use args::DropInArgs;
 pub use run::densify_point_cloud;
