@@ -4,7 +4,7 @@ use crate::cli::one_line::printable;
 use crate::cli::semvs_args::InspectArgs;
 use crate::error::{Error, Result};
 use crate::pipeline;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::fmt::Write;
 
 /// Runs the command.
@@ -41,6 +41,9 @@ fn text(facts: &Value) -> String {
                     let _ = writeln!(out, "  ... and {} more (--json shows all)", rows.len() - MAX_ROWS);
                 }
             }
+            Value::Object(counts) if name == "labels" => {
+                let _ = write!(out, "{name}:\n{}", label_bars(counts, facts["comments"].as_array()));
+            }
             Value::Object(fields) => {
                 let _ = writeln!(out, "{name}:");
                 for (key, value) in fields {
@@ -68,6 +71,27 @@ fn bars(rows: &[Value]) -> Option<String> {
         format!("  {:>10} to {:<10} {bar:<40} {pixels}\n", short(from), short(to))
     };
     Some(bars.iter().map(line).collect())
+}
+
+/// Numbers of points by class id as lines of bars, with the names that the file's comments give the classes.
+fn label_bars(counts: &Map<String, Value>, comments: Option<&Vec<Value>>) -> String {
+    let name_of = |id: &str| {
+        let named = comments.into_iter().flatten().filter_map(Value::as_str).find_map(|comment| {
+            let (known, name) = comment.strip_prefix("class ")?.split_once(' ')?;
+            // Behind the name is the colour.
+            let name = name.rsplitn(4, ' ').last().unwrap_or(name);
+            (known == id).then(|| printable(name))
+        });
+        named.unwrap_or_else(|| if id == "0" { "void".to_owned() } else { String::new() })
+    };
+    let rows: Vec<(String, u64)> =
+        counts.iter().map(|(id, n)| (format!("{id} {}", name_of(id)), n.as_u64().unwrap_or(0))).collect();
+    let most = rows.iter().map(|row| row.1).max().unwrap_or(0).max(1);
+    let line = |(name, points): &(String, u64)| {
+        let bar = "#".repeat((*points as f64 / most as f64 * BAR).ceil() as usize);
+        format!("  {name:<24} {bar:<40} {points}\n")
+    };
+    rows.iter().map(line).collect()
 }
 
 /// Four digits of a number, or a few more.
@@ -108,6 +132,19 @@ mod tests {
         assert_eq!(lines[0], "depth histogram:");
         assert_eq!(lines[1], format!("       9.750 to 10.25      {:<40} 10", "#".repeat(10)));
         assert!(lines[2].contains(&"#".repeat(40)) && lines[3].ends_with(" 0") && !lines[3].contains('#'));
+    }
+
+    #[test]
+    fn labels_become_bars_with_names() {
+        let facts = serde_json::json!({
+            "comments": ["class 1 tall building 0 0 255", "made by hand"],
+            "labels": {"0": 10, "1": 40, "7": 1},
+        });
+        let text = text(&facts);
+        let lines: Vec<&str> = text.lines().skip_while(|line| *line != "labels:").collect();
+        assert_eq!(lines[1], format!("  {:<24} {:<40} 10", "0 void", "#".repeat(10)));
+        assert_eq!(lines[2], format!("  {:<24} {:<40} 40", "1 tall building", "#".repeat(40)));
+        assert_eq!(lines[3], format!("  {:<24} {:<40} 1", "7 ", "#"));
     }
 
     #[test]
