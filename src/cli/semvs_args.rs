@@ -304,6 +304,9 @@ pub(crate) struct CompareArgs {
     /// Scene of the clouds: distances are reported relative to depth too
     #[arg(long, value_name = "SCENE.mvs")]
     pub(crate) scene: Option<PathBuf>,
+    /// Write a page to be opened in a browser: pictures of the differences, histograms, limits
+    #[arg(long, value_name = "FILE.html")]
+    pub(crate) html: Option<PathBuf>,
     /// As JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -312,5 +315,6 @@ pub(crate) struct CompareArgs {
 const COMPARE_EXAMPLES: &str = "\
 Examples:
   semvs compare depthmaps reference/depthmaps --expect depth-maps.toml
+  semvs compare depthmaps reference/depthmaps --html differences.html
   semvs compare cloud.ply reference/cloud.ply.zst --scene scene.mvs --json
   semvs compare scene_dense.mvs reference/scene_dense.mvs";

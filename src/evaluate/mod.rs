@@ -10,10 +10,10 @@ pub use cloud::{
     ClassScore, ClassScores, CloudScoreOptions, CloudScores, DistanceScore, LabelledPoints, cloud_scores,
 };
 pub use compare::{
-    Agreement, CLOUD_FIGURES, Catalog, CloudComparison, ComparedImage, ComparedScene, Comparison,
+    Agreement, CLOUD_FIGURES, Catalog, Check, CloudComparison, ComparedImage, ComparedScene, Comparison,
     Differences, FOLDER_FIGURES, Figure, Figures, FirstDifference, Kind, Limit, MAP_FIGURES, MapComparison,
-    Part, SCENE_FIGURES, Shape, Tolerance, Violation, check_limits, compare_clouds, compare_maps,
-    compare_scenes, folder_figures, names,
+    MapDifferences, Part, Presence, SCENE_FIGURES, Shape, Sizes, Tolerance, check_limits, compare_clouds,
+    compare_maps, compare_scenes, folder_figures, map_differences, names,
 };
 pub use labels::LabelScores;
 pub use maps::{MapScoreOptions, MapScores, map_scores};

@@ -30,6 +30,7 @@ mod labels_render;
 mod masks;
 mod memory_plan;
 mod outputs;
+mod page_parts;
 mod prepare;
 mod preview;
 mod problem;

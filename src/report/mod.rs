@@ -2,6 +2,8 @@
 
 mod build;
 mod classes;
+mod comparison_page;
+mod document;
 mod label_check;
 mod page;
 mod pictures;
@@ -11,14 +13,18 @@ mod viewer_points;
 
 pub use build::{VERSION, build, commit, with_commit};
 pub use classes::{ClassRow, class_table, fill_shares};
+pub use comparison_page::{
+    ComparisonPage, ComparisonRamps, ComparisonScales, PageCheck, PageDifferences, PageFigures, PagePair,
+    PairLayers,
+};
+pub use document::data_address;
 pub use label_check::{CheckedView, ClassName, LabelCheck};
 pub use page::{
-    BARS, PageCamera, PageClass, PageCloud, PageCloudClass, PageLayers, PageRamps, PageView, ReportPage,
-    add_to, data_address,
+    BARS, PageCamera, PageCloud, PageCloudClass, PageLayers, PageRamps, PageView, ReportPage, add_to,
 };
 pub use pictures::{
-    NOTHING, Ramp, confidence_picture, depth_picture, depth_scale, label_overlay, label_picture,
-    marked_picture, normal_picture,
+    NOTHING, Ramp, amount_picture, confidence_picture, depth_picture, depth_scale, label_overlay,
+    label_picture, marked_picture, normal_picture, presence_picture, signed_picture,
 };
 pub use run::{OutputReport, RunReport, StageTime, ViewReport};
 pub use table::{Align, Table, grouped};

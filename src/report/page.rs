@@ -1,16 +1,14 @@
 //! A run as one HTML page that needs nothing else: no network, no other file.
 
+use super::classes::ClassRow;
+use super::document::Document;
 use super::pictures::Ramp;
 use super::run::{OutputReport, StageTime};
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-const TEMPLATE: &str = include_str!("page/page.html");
-const STYLE: &str = include_str!("page/page.css");
-const VIEWER: &str = include_str!("page/viewer.js");
-const SCRIPT: &str = include_str!("page/page.js");
+const BODY: &str = include_str!("page/run.html");
+const SCRIPT: &str = include_str!("page/run.js");
 
 /// Bars of the histograms of a page.
 pub const BARS: usize = 20;
@@ -40,8 +38,8 @@ pub struct ReportPage {
     pub options: Map<String, Value>,
     /// Times by stage.
     pub stages: Vec<StageTime>,
-    /// Classes that occur, by id.
-    pub classes: Vec<PageClass>,
+    /// Classes that occur, by id; of runs that left no summary with their points alone.
+    pub classes: Vec<ClassRow>,
     /// What was warned of.
     pub warnings: Vec<String>,
     /// Files written.
@@ -58,21 +56,6 @@ pub struct ReportPage {
     pub ramps: PageRamps,
     /// The cloud, if there is one to show.
     pub cloud: Option<PageCloud>,
-}
-
-/// A class.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct PageClass {
-    /// Id, 0 = void.
-    pub id: u16,
-    /// Name.
-    pub name: String,
-    /// Red, green, blue.
-    pub color: [u8; 3],
-    /// Points of the whole cloud.
-    pub points: u64,
-    /// Whether its points belong in the cloud.
-    pub kept: bool,
 }
 
 /// A view.
@@ -199,11 +182,6 @@ pub struct PageCloudClass {
     pub shown: bool,
 }
 
-/// `bytes` as a `data:` address.
-pub fn data_address(kind: &str, bytes: &[u8]) -> String {
-    format!("data:{kind};base64,{}", STANDARD.encode(bytes))
-}
-
 /// Adds `value`, of 0 to 1, to a histogram.
 pub fn add_to(bars: &mut [u64; BARS], value: f64) {
     bars[((value.max(0.0) * BARS as f64) as usize).min(BARS - 1)] += 1;
@@ -215,42 +193,15 @@ impl ReportPage {
     /// # Errors
     /// None in practice: every value has a JSON form.
     pub fn render(&self, points: &[u8]) -> serde_json::Result<String> {
-        // Nothing in a string may end the script element that holds it.
-        let data = serde_json::to_string(self)?.replace('<', "\\u003c");
-        let points = STANDARD.encode(points);
-        let title = escaped(&self.title);
-        Ok(filled(TEMPLATE, |name| match name {
-            "TITLE" => &title,
-            "STYLE" => STYLE,
-            "DATA" => &data,
-            "POINTS" => &points,
-            "VIEWER" => VIEWER,
-            "PAGE" => SCRIPT,
-            _ => "",
-        }))
+        Document { title: &self.title, body: BODY, script: SCRIPT }.render(self, points)
     }
-}
-
-/// `template` with every `{{NAME}}` replaced; what is filled in is left as it is.
-fn filled<'a>(template: &str, value: impl Fn(&str) -> &'a str) -> String {
-    let mut out = String::new();
-    let mut rest = template;
-    while let Some((before, after)) = rest.split_once("{{") {
-        let Some((name, behind)) = after.split_once("}}") else { break };
-        out.push_str(before);
-        out.push_str(value(name));
-        rest = behind;
-    }
-    out + rest
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use base64::Engine as _;
+    use base64::engine::general_purpose::STANDARD;
 
     #[test]
     fn names_cannot_break_out_of_the_page() {

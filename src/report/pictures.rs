@@ -1,5 +1,6 @@
 //! Maps as pictures: perceptual ramps for depths and confidences, directions and classes as colours.
 
+use crate::evaluate::Presence;
 use crate::scene::{ColorImage, ConfidenceMap, DepthMap, Grid, LabelMap, NormalMap};
 use crate::semantics::{ClassId, ClassTable};
 
@@ -33,6 +34,22 @@ impl Ramp {
         [252, 253, 191],
     ]);
 
+    /// Differences from −1 to 1, none of them in the middle: RdBu of ColorBrewer (Harrower and Brewer 2003), blue first.
+    pub const DIFFERENCE: Ramp = Ramp(&[
+        [33, 102, 172],
+        [67, 147, 195],
+        [146, 197, 222],
+        [209, 229, 240],
+        [247, 247, 247],
+        [253, 219, 199],
+        [244, 165, 130],
+        [214, 96, 77],
+        [178, 24, 43],
+    ]);
+    /// Differences without a sign: the second half of [`Ramp::DIFFERENCE`].
+    pub const AMOUNT: Ramp =
+        Ramp(&[[247, 247, 247], [253, 219, 199], [244, 165, 130], [214, 96, 77], [178, 24, 43]]);
+
     /// Evenly spaced colours, the first of 0, the last of 1.
     pub fn stops(&self) -> &'static [[u8; 3]] {
         self.0
@@ -55,6 +72,14 @@ impl Ramp {
 
 /// Colour of a pixel without a value.
 pub const NOTHING: [u8; 3] = [206, 209, 213];
+
+/// The same in pictures of differences, whose middle is nearly white.
+const NO_DIFFERENCE: [u8; 3] = [150, 154, 160];
+/// What only the first of two results has, and only the second (Okabe and Ito 2008: apart for every kind of eye).
+pub(super) const ONLY_A: [u8; 3] = [230, 159, 0];
+pub(super) const ONLY_B: [u8; 3] = [0, 114, 178];
+/// Steps of the ramps in pictures of differences: few enough for the palette of a PNG.
+const STEPS: f32 = 100.0;
 
 /// Share of the depths at either end of all that do not count for the scale.
 const OUTLIERS: f64 = 0.01;
@@ -125,6 +150,41 @@ pub fn marked_picture(marked: &Grid<bool>, photograph: Option<&ColorImage>) -> C
     })
 }
 
+/// Differences from `-most` to `most` in the colours of [`Ramp::DIFFERENCE`]; grey where they are not numbers.
+pub fn signed_picture(differences: &Grid<f32>, most: f32) -> ColorImage {
+    steps(differences, most, |share| Ramp::DIFFERENCE.at(0.5 + 0.5 * share))
+}
+
+/// Differences from 0 to `most` in the colours of [`Ramp::AMOUNT`]; grey where they are not numbers.
+pub fn amount_picture(differences: &Grid<f32>, most: f32) -> ColorImage {
+    steps(differences, most, |share| Ramp::AMOUNT.at(share))
+}
+
+fn steps(differences: &Grid<f32>, most: f32, color: impl Fn(f32) -> [u8; 3]) -> ColorImage {
+    let mut out = picture(differences, |_, &d| {
+        let share = if d == 0.0 { 0.0 } else { (d / most).clamp(-1.0, 1.0) };
+        (!d.is_nan()).then(|| color((share * STEPS).round() / STEPS))
+    });
+    for (pixel, d) in out.data_mut().iter_mut().zip(differences.data()) {
+        if d.is_nan() {
+            *pixel = NO_DIFFERENCE;
+        }
+    }
+    out
+}
+
+/// Which of two maps has a depth: nearly white where both have, orange and blue for one alone, grey for none.
+pub fn presence_picture(presence: &Grid<Presence>) -> ColorImage {
+    picture(presence, |_, presence| {
+        Some(match presence {
+            Presence::Both => Ramp::AMOUNT.at(0.0),
+            Presence::OnlyA => ONLY_A,
+            Presence::OnlyB => ONLY_B,
+            Presence::Neither => NO_DIFFERENCE,
+        })
+    })
+}
+
 fn has_depth(depth: &DepthMap, i: usize) -> bool {
     depth.data().get(i).is_some_and(|&d| d > 0.0)
 }
@@ -180,6 +240,24 @@ mod tests {
         assert_eq!(confidence_picture(&ones, &depth).data(), [NOTHING, Ramp::CONFIDENCE.at(1.0)]);
         let normals = Grid::from_vec(size, vec![[0.0, 0.0, -1.0]; 2]).unwrap();
         assert_eq!(normal_picture(&normals, &depth).data(), [NOTHING, [128, 128, 255]]);
+    }
+
+    #[test]
+    fn differences_are_white_in_the_middle_and_have_few_colours() {
+        let size = Size::new(5, 1);
+        let differences = Grid::from_vec(size, vec![-3.0, 0.0, 0.5, f32::NAN, f32::INFINITY]).unwrap();
+        let ramp = Ramp::DIFFERENCE;
+        let expected = [ramp.at(0.0), ramp.at(0.5), ramp.at(0.75), NO_DIFFERENCE, ramp.at(1.0)];
+        assert_eq!(signed_picture(&differences, 1.0).data(), expected);
+        assert_eq!(amount_picture(&differences, 1.0).data()[1..3], [ramp.at(0.5), ramp.at(0.75)]);
+        assert_eq!(signed_picture(&Grid::filled(size, 0.0), 0.0).data(), [ramp.at(0.5); 5]);
+        let many = Grid::from_vec(Size::new(5000, 1), (0..5000).map(|i| i as f32 / 2500.0 - 1.0).collect());
+        let colors: std::collections::BTreeSet<[u8; 3]> =
+            signed_picture(&many.unwrap(), 1.0).data().iter().copied().collect();
+        assert!((150..=201).contains(&colors.len()), "{}", colors.len());
+        let presence = [Presence::Both, Presence::OnlyA, Presence::OnlyB, Presence::Neither, Presence::Both];
+        let picture = presence_picture(&Grid::from_vec(size, presence.to_vec()).unwrap());
+        assert_eq!(picture.data(), [ramp.at(0.5), ONLY_A, ONLY_B, NO_DIFFERENCE, ramp.at(0.5)]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::scene::ColorImage;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
@@ -31,7 +32,11 @@ pub(crate) fn write_picture(path: &Path, image: &ColorImage) -> Result<()> {
 /// An image without pixels.
 pub(crate) fn png_bytes(image: &ColorImage) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    encode_png(&mut bytes, image).map_err(|e| Error::invalid(format!("no PNG: {e}")))?;
+    let written = match palette(image) {
+        Some((colors, indices)) => encode_palette(&mut bytes, image, &colors, &indices),
+        None => encode_png(&mut bytes, image),
+    };
+    written.map_err(|e| Error::invalid(format!("no PNG: {e}")))?;
     Ok(bytes)
 }
 
@@ -46,6 +51,35 @@ pub(crate) fn jpeg_bytes(image: &ColorImage, quality: u8) -> Result<Vec<u8>> {
         .encode(image.data().as_flattened(), width, height, ExtendedColorType::Rgb8)
         .map_err(|e| Error::invalid(format!("no JPEG: {e}")))?;
     Ok(bytes)
+}
+
+/// The colours of an image, and which of them every pixel has; `None` if there are more than a byte can tell.
+fn palette(image: &ColorImage) -> Option<(Vec<[u8; 3]>, Vec<u8>)> {
+    let (mut places, mut colors) = (HashMap::new(), Vec::new());
+    let mut indices = Vec::with_capacity(image.data().len());
+    for &color in image.data() {
+        let place = *places.entry(color).or_insert_with(|| {
+            colors.push(color);
+            colors.len() - 1
+        });
+        indices.push(u8::try_from(place).ok()?);
+    }
+    Some((colors, indices))
+}
+
+fn encode_palette(
+    to: impl Write,
+    image: &ColorImage,
+    colors: &[[u8; 3]],
+    indices: &[u8],
+) -> std::result::Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(to, image.size().width, image.size().height);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_palette(colors.as_flattened().to_vec());
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(indices)?;
+    writer.finish()
 }
 
 fn encode_png(to: impl Write, image: &ColorImage) -> std::result::Result<(), png::EncodingError> {
@@ -87,6 +121,11 @@ mod tests {
         picture.data_mut()[0] = [1, 2, 3];
         let png = image::load_from_memory(&png_bytes(&picture).unwrap()).unwrap().into_rgb8();
         assert_eq!(png.as_raw(), picture.data().as_flattened());
+        // More colours than a palette holds.
+        let many = (0..300u32).map(|i| [(i / 2) as u8, (i % 7) as u8, i as u8]).collect();
+        let many = ColorImage::from_vec(Size::new(20, 15), many).unwrap();
+        let png = image::load_from_memory(&png_bytes(&many).unwrap()).unwrap().into_rgb8();
+        assert_eq!(png.as_raw(), many.data().as_flattened());
         let jpeg = image::load_from_memory(&jpeg_bytes(&picture, 85).unwrap()).unwrap().into_rgb8();
         assert_eq!(jpeg.dimensions(), (40, 30));
         assert!(jpeg.get_pixel(30, 20).0.iter().zip([200, 30, 60]).all(|(&a, b)| a.abs_diff(b) < 6));

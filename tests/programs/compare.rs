@@ -271,8 +271,109 @@ fn the_commands_of_the_page_print_what_it_shows() {
             assert!(same, "{command}\nprints\n{printed}\nUPDATE_GOLDEN=1 accepts it");
         }
     }
-    assert_eq!(commands, 11);
+    assert_eq!(commands, 12);
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         std::fs::write(page_path(), new).unwrap();
     }
+}
+
+/// The data of a page.
+#[track_caller]
+fn data_of(scratch: &Scratch, name: &str) -> (String, Value) {
+    let text = String::from_utf8(scratch.read(name)).unwrap();
+    let data = text.split_once("id=\"data\">").unwrap().1.split_once("</script>").unwrap().0;
+    let data = serde_json::from_str(data).unwrap();
+    (text, data)
+}
+
+#[test]
+fn a_page_shows_where_depth_maps_differ() {
+    let scratch = Scratch::new();
+    scratch.write("expect.toml", "[limits]\nvalid.iou = { min = 0.93 }\nmaps.both = { max = 6 }\n");
+    let (a, b) = (openmvs("post7"), openmvs("raw"));
+    let out = compare(&scratch, &a, &b, &["--expect", "expect.toml", "--html", "d/page.html"]);
+    assert_eq!(out.code, Some(1), "{out:?}");
+    assert!(out.stdout.contains("outside the limits\n\nd/page.html: "), "{}", out.stdout);
+    let (text, data) = data_of(&scratch, "d/page.html");
+    assert!(text.len() < 1_500_000, "{}", text.len());
+    let report = compare(&scratch, &a, &b, &["--expect", "expect.toml", "--json"]);
+    let report: Value = serde_json::from_str(&report.stdout).unwrap();
+    // Every limit has its row, and those that fail are those of the report.
+    let checks = data["checks"].as_array().unwrap();
+    let failed: Vec<&Value> = checks.iter().filter(|check| check["holds"] == false).collect();
+    let violations = report["violations"].as_array().unwrap();
+    assert!(checks.len() == 7 && !failed.is_empty() && failed.len() < 7, "{checks:?}");
+    assert_eq!(failed.len(), violations.len());
+    for (check, violation) in failed.iter().zip(violations) {
+        assert_eq!((&check["part"], &check["value"]), (&violation["part"], &violation["value"]));
+    }
+    let parts = data["parts"].as_array().unwrap();
+    assert_eq!(parts.len(), 6);
+    for (part, reported) in parts.iter().zip(report["parts"].as_array().unwrap()) {
+        assert_eq!(part["first"], reported["first"]);
+        let layers = part["layers"].as_object().unwrap();
+        let names: Vec<&str> = layers.keys().map(String::as_str).collect();
+        assert_eq!(names, ["a", "b", "depth", "presence", "normal", "confidence"]);
+        let depth = &part["figures"]["differences"][0];
+        assert_eq!((&depth["name"], &depth["p99"]), (&"depth".into(), &reported["figures"]["depth.p99"]));
+        let bars = depth["sizes"]["bars"].as_array().unwrap();
+        let counted: u64 = bars.iter().map(|bar| bar.as_u64().unwrap()).sum();
+        assert_eq!(counted + depth["equal"].as_u64().unwrap(), depth["compared"].as_u64().unwrap());
+    }
+    let scales = &data["scales"];
+    assert!((0.001..0.02).contains(&scales["difference"].as_f64().unwrap()), "{scales}");
+    assert!(scales["depth"][0].as_f64().unwrap() > 1.0);
+    // The picture of a map is that of its pixels: those that the filter has dropped are in B alone.
+    let presence = decoded(&parts[0]["layers"]["presence"]);
+    assert_eq!(presence.dimensions(), (200, 150));
+    let count = |color: [u8; 3]| presence.pixels().filter(|pixel| pixel.0 == color).count() as u64;
+    let single = parts[0]["figures"]["single"].as_array().unwrap();
+    let figure = |name: &str| single.iter().find(|row| row[0] == name).unwrap()[1].as_f64().unwrap() as u64;
+    assert_eq!(count([0, 114, 178]), figure("valid.b") - figure("valid.both"));
+    assert_eq!(count([247, 247, 247]), figure("valid.both"));
+    // Equal maps have white pictures and no scale.
+    compare(&scratch, &a, &a, &["--html", "same.html"]).ok();
+    let (_, same) = data_of(&scratch, "same.html");
+    assert_eq!((&same["scales"]["difference"], &same["checks"]), (&0.0.into(), &Value::Null));
+    let colors: std::collections::BTreeSet<[u8; 3]> =
+        decoded(&same["parts"][0]["layers"]["depth"]).pixels().map(|pixel| pixel.0).collect();
+    assert_eq!(colors.into_iter().collect::<Vec<_>>(), [[150, 154, 160], [247, 247, 247]]);
+}
+
+/// The picture of a `data:` address.
+fn decoded(address: &Value) -> image::RgbImage {
+    use base64::Engine as _;
+    let (_, bytes) = address.as_str().unwrap().split_once("base64,").unwrap();
+    let bytes = base64::engine::general_purpose::STANDARD.decode(bytes).unwrap();
+    image::load_from_memory(&bytes).unwrap().into_rgb8()
+}
+
+#[test]
+fn pages_about_clouds_and_scenes_have_what_there_is() {
+    let scratch = Scratch::new();
+    let (a, b) = (openmvs("fuse2/scene_dense.ply.zst"), openmvs("post7/scene_dense.ply.zst"));
+    let out = compare(&scratch, &a, &b, &["--html", "clouds.html", "--json"]).ok();
+    let report: Value = serde_json::from_str(&out.stdout).unwrap();
+    assert_eq!(report["page"], "clouds.html");
+    let (text, data) = data_of(&scratch, "clouds.html");
+    let classes = data["cloud"]["classes"].as_array().unwrap();
+    let counts: Vec<u64> = classes.iter().map(|class| class["points"].as_u64().unwrap()).collect();
+    assert!((27_000..=27_651).contains(&counts[0]) && (23_700..=24_171).contains(&counts[1]), "{counts:?}");
+    assert!(data["scales"]["distance"][1].as_f64().unwrap() > 0.0 && text.len() < 2_000_000);
+    let names: Vec<&str> = data["figures"]["differences"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|differences| differences["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["nearest.a_to_b", "nearest.b_to_a"]);
+    let (a, b) = (openmvs("post7/scene_dense.mvs"), openmvs("archive2/scene_dense.mvs"));
+    compare(&scratch, &a, &b, &["--html", "scenes.html"]).ok();
+    let (_, data) = data_of(&scratch, "scenes.html");
+    assert_eq!((&data["kind"], &data["cloud"]), (&"scenes".into(), &Value::Null));
+    assert!(data["first"]["place"].is_string(), "{}", data["first"]);
+    // A page never takes the place of a result, and the results are not looked at before that is known.
+    cannot(&compare(&scratch, &a, &b, &["--html", "x.mvs"]), "end the name in .html");
+    scratch.write("file", "");
+    cannot(&compare(&scratch, &a, &b, &["--html", "file/x.html"]), "file");
 }

@@ -1,8 +1,9 @@
 //! `semvs compare`.
 
+use super::report::check_page;
 use crate::cli::semvs_args::CompareArgs;
 use crate::error::{Error, Result};
-use crate::evaluate::{Comparison, Differences, Figure, Figures, FirstDifference, Kind, Part, Violation};
+use crate::evaluate::{Check, Comparison, Differences, Figure, Figures, FirstDifference, Kind, Part};
 use crate::pipeline::compare::{self, CompareJob, Expectation, Outcome};
 use crate::report::{Align, Table};
 use serde::Serialize;
@@ -19,14 +20,21 @@ const SCHEMA: u32 = 1;
 /// Runs the command.
 pub(crate) fn compare(args: &CompareArgs) -> Result<ExitCode> {
     let expect = args.expect.as_deref().map(Expectation::read).transpose()?;
-    let job = CompareJob { a: args.a.clone(), b: args.b.clone(), scene: args.scene.clone(), expect };
+    args.html.as_deref().map(check_page).transpose()?;
+    let job = CompareJob {
+        a: args.a.clone(),
+        b: args.b.clone(),
+        scene: args.scene.clone(),
+        expect,
+        page: args.html.clone(),
+    };
     let outcome = compare::compare(&job)?;
     let text = match args.json {
         true => json(args, &outcome)?,
         false => text(args, &outcome),
     };
     crate::cli::print(&text);
-    Ok(match &outcome.violations {
+    Ok(match outcome.violations() {
         Some(violations) if !violations.is_empty() => ExitCode::from(OUTSIDE),
         _ => ExitCode::SUCCESS,
     })
@@ -44,17 +52,22 @@ struct Report<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     within: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    violations: &'a Option<Vec<Violation>>,
+    violations: Option<Vec<Check>>,
+    /// The page, if one was written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    page: Option<String>,
 }
 
 fn json(args: &CompareArgs, outcome: &Outcome) -> Result<String> {
+    let violations = outcome.violations();
     let report = Report {
         schema: SCHEMA,
         a: args.a.display().to_string(),
         b: args.b.display().to_string(),
         comparison: &outcome.comparison,
-        within: outcome.violations.as_ref().map(Vec::is_empty),
-        violations: &outcome.violations,
+        within: violations.as_ref().map(Vec::is_empty),
+        violations,
+        page: args.html.as_ref().map(|path| path.display().to_string()),
     };
     let text = serde_json::to_string_pretty(&report).map_err(|e| Error::invalid(format!("no JSON: {e}")))?;
     Ok(text + "\n")
@@ -68,12 +81,15 @@ fn text(args: &CompareArgs, outcome: &Outcome) -> String {
         [part] if !args.a.is_dir() => details(&part.figures, &part.notes, part.first.as_ref(), &mut out),
         parts => folder(comparison, parts, &mut out),
     }
-    if let Some(violations) = &outcome.violations {
+    if let Some(violations) = outcome.violations() {
         out.push('\n');
-        for violation in violations {
+        for violation in &violations {
             let _ = writeln!(out, "outside: {violation}");
         }
         out.push_str(if violations.is_empty() { "within all limits\n" } else { "outside the limits\n" });
+    }
+    if let Some((path, bytes)) = args.html.as_ref().zip(outcome.page_bytes) {
+        let _ = writeln!(out, "\n{}: {:.1} MB", path.display(), bytes as f64 / 1e6);
     }
     out
 }

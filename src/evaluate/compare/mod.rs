@@ -3,12 +3,14 @@
 mod clouds;
 mod figures;
 mod limits;
+mod map_differences;
 mod maps;
 mod scenes;
 
 pub use clouds::{CLOUD_FIGURES, CloudComparison, compare_clouds};
 pub use figures::{Catalog, Figure, Figures, Shape, names};
-pub use limits::{Limit, Violation, check_limits};
+pub use limits::{Check, Limit, check_limits};
+pub use map_differences::{MapDifferences, Presence, map_differences};
 pub use maps::{FOLDER_FIGURES, MAP_FIGURES, MapComparison, compare_maps, folder_figures};
 pub use scenes::{ComparedImage, ComparedScene, SCENE_FIGURES, compare_scenes};
 
@@ -129,6 +131,43 @@ pub struct Differences {
     pub max: f64,
     /// Shares of the elements that differ by at most 1e-6, 1e-3 and 1e-2.
     pub within: [f64; 3],
+    /// The elements by the size of their difference.
+    pub sizes: Sizes,
+}
+
+/// Bars of the histogram of differences.
+const BARS: usize = 24;
+
+/// Elements by the size of their difference: two bars for every power of ten, down from the largest. Elements without any
+/// difference are in none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Sizes {
+    /// The last bar ends at 10^(top / 2).
+    pub top: i32,
+    /// How many differ by so much; the first bar has all that differ by less.
+    pub bars: [usize; BARS],
+    /// How many differ without bound.
+    pub unbounded: usize,
+}
+
+impl Sizes {
+    /// Of ascending differences.
+    fn of(sorted: &[f64]) -> Self {
+        let bounded = sorted.partition_point(|v| v.is_finite());
+        let mut sizes = Sizes { unbounded: sorted.len() - bounded, ..Sizes::default() };
+        let mut counted = sorted.partition_point(|v| *v <= 0.0);
+        if counted >= bounded {
+            return sizes;
+        }
+        sizes.top = (2.0 * sorted[bounded - 1].log10()).ceil() as i32;
+        for (bar, count) in sizes.bars.iter_mut().enumerate() {
+            let edge = 10f64.powf(f64::from(sizes.top - (BARS - 1 - bar) as i32) / 2.0);
+            let up_to = if bar + 1 == BARS { bounded } else { sorted.partition_point(|v| *v <= edge) };
+            *count = up_to.min(bounded).saturating_sub(counted);
+            counted = counted.max(up_to.min(bounded));
+        }
+        sizes
+    }
 }
 
 impl Differences {
@@ -149,6 +188,7 @@ impl Differences {
             max,
             within: [1e-6, 1e-3, 1e-2]
                 .map(|limit| values.partition_point(|v| *v <= limit) as f64 / values.len() as f64),
+            sizes: Sizes::of(&values),
         })
     }
 }
@@ -264,6 +304,19 @@ mod tests {
         let few = Differences::of(vec![0.0, 0.0, f64::INFINITY]).unwrap();
         assert_eq!((few.equal, few.p50, few.p90, few.max), (2, 0.0, f64::INFINITY, f64::INFINITY));
         assert_eq!(Differences::of(Vec::new()), None);
+    }
+
+    #[test]
+    fn differences_are_counted_by_their_size() {
+        let sizes = Differences::of(vec![0.0, 0.0, 1e-30, 0.001, 0.02, 0.05, 0.06, 0.1, f64::INFINITY]);
+        let sizes = sizes.unwrap().sizes;
+        assert_eq!((sizes.top, sizes.unbounded), (-2, 1));
+        // 0.0316 to 0.1, 0.01 to 0.0316, ..., and everything below the least edge.
+        assert_eq!((sizes.bars[23], sizes.bars[22], sizes.bars[20], sizes.bars[19]), (3, 1, 0, 1));
+        assert_eq!((sizes.bars[0], sizes.bars.iter().sum::<usize>()), (1, 6));
+        assert_eq!(Differences::of(vec![0.0]).unwrap().sizes, Sizes::default());
+        let only = Differences::of(vec![f64::INFINITY, 3.0]).unwrap().sizes;
+        assert_eq!((only.top, only.bars[23], only.unbounded), (1, 1, 1));
     }
 
     #[test]

@@ -1,16 +1,22 @@
 //! Two results against each other, from files: scenes, depth maps or folders of them, clouds.
 
 mod expect;
+mod page;
+mod pictures;
+mod points;
 mod read;
 
 pub use expect::Expectation;
 
 use crate::error::{Error, Result};
 use crate::evaluate::{
-    Comparison, Kind, Part, Tolerance, Violation, check_limits, compare_clouds, compare_maps, compare_scenes,
+    Check, Comparison, Kind, Part, Tolerance, check_limits, compare_clouds, compare_maps, compare_scenes,
     folder_figures,
 };
+use crate::store::atomic::check_writable;
 use crate::store::packed;
+use page::Looks;
+use pictures::SmallPair;
 use semvs_formats::Limits;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,6 +32,8 @@ pub struct CompareJob {
     pub scene: Option<PathBuf>,
     /// What the differences may be.
     pub expect: Option<Expectation>,
+    /// The page to write about it.
+    pub page: Option<PathBuf>,
 }
 
 /// What `compare` found.
@@ -33,14 +41,25 @@ pub struct CompareJob {
 pub struct Outcome {
     /// The differences.
     pub comparison: Comparison,
-    /// Those outside their limits; `None` if none were given.
-    pub violations: Option<Vec<Violation>>,
+    /// The numbers held against their limits; `None` if none were given.
+    pub checks: Option<Vec<Check>>,
+    /// Bytes of the page that was written.
+    pub page_bytes: Option<usize>,
+}
+
+impl Outcome {
+    /// The numbers outside their limits; `None` if none were given.
+    pub fn violations(&self) -> Option<Vec<Check>> {
+        let checks = self.checks.as_ref()?;
+        Some(checks.iter().filter(|check| !check.holds()).cloned().collect())
+    }
 }
 
 /// Runs `job`.
 ///
 /// # Errors
-/// Results that are unreadable, of different kinds, or maps of different sizes; limits on figures that there are not.
+/// Results that are unreadable, of different kinds, or maps of different sizes; limits on figures that there are not; a
+/// page that cannot be written.
 pub fn compare(job: &CompareJob) -> Result<Outcome> {
     let (a, b) = (kind_of(&job.a)?, kind_of(&job.b)?);
     let is_folder = |path: &Path| if path.is_dir() { "a folder" } else { "a file" };
@@ -62,18 +81,24 @@ pub fn compare(job: &CompareJob) -> Result<Outcome> {
     if let Some(expect) = &job.expect {
         expect.check_kind(a)?;
     }
+    job.page.as_deref().map(check_writable).transpose()?;
+    let mut looks = job.page.is_some().then(Looks::default);
     let comparison = match a {
         Kind::Scenes => scenes(job, &tolerance)?,
-        Kind::DepthMaps => depth_maps(job, &tolerance)?,
-        Kind::Clouds => clouds(job, &tolerance)?,
+        Kind::DepthMaps => depth_maps(job, &tolerance, looks.as_mut())?,
+        Kind::Clouds => clouds(job, &tolerance, looks.as_mut())?,
     };
-    let violations = match &job.expect {
+    let checks = match &job.expect {
         Some(expect) => {
             Some(check_limits(&comparison, &expect.limits).map_err(|e| expect.error(&e.to_string()))?)
         }
         None => None,
     };
-    Ok(Outcome { comparison, violations })
+    let mut outcome = Outcome { comparison, checks, page_bytes: None };
+    if let Some((path, looks)) = job.page.as_deref().zip(looks) {
+        outcome.page_bytes = Some(page::write(job, &outcome, &looks, path)?);
+    }
+    Ok(outcome)
 }
 
 /// What a file holds by its first bytes, or else by its name; folders hold depth maps.
@@ -103,10 +128,13 @@ fn scenes(job: &CompareJob, tolerance: &Tolerance) -> Result<Comparison> {
     Ok(Comparison { kind: Kind::Scenes, figures, notes, first, parts: Vec::new() })
 }
 
-fn clouds(job: &CompareJob, tolerance: &Tolerance) -> Result<Comparison> {
+fn clouds(job: &CompareJob, tolerance: &Tolerance, looks: Option<&mut Looks>) -> Result<Comparison> {
     let (a, b) = (read::cloud(&job.a)?, read::cloud(&job.b)?);
     let cameras = job.scene.as_deref().map(read::calibrations).transpose()?;
     let compared = compare_clouds(&a, &b, cameras.as_deref(), tolerance)?;
+    if let Some(looks) = looks {
+        looks.clouds = Some((a, b));
+    }
     Ok(Comparison {
         kind: Kind::Clouds,
         figures: compared.figures(),
@@ -116,13 +144,17 @@ fn clouds(job: &CompareJob, tolerance: &Tolerance) -> Result<Comparison> {
     })
 }
 
-fn depth_maps(job: &CompareJob, tolerance: &Tolerance) -> Result<Comparison> {
+fn depth_maps(job: &CompareJob, tolerance: &Tolerance, mut looks: Option<&mut Looks>) -> Result<Comparison> {
     let (pairs, only_a, only_b) = pairs(job)?;
     let mut parts = Vec::new();
     for (name, a, b) in &pairs {
         let [map_a, map_b] = [a, b].map(|path| packed::read_map(path, &Limits::default()));
+        let (map_a, map_b) = (map_a?, map_b?);
         let compared =
-            compare_maps(&map_a?, &map_b?, tolerance).map_err(|e| Error::content(a, e.to_string()))?;
+            compare_maps(&map_a, &map_b, tolerance).map_err(|e| Error::content(a, e.to_string()))?;
+        if let Some(looks) = &mut looks {
+            looks.pairs.extend(SmallPair::new(&map_a, &map_b, pairs.len()));
+        }
         let (figures, notes) = (compared.figures(), compared.notes());
         parts.push(Part { name: name.clone(), figures, notes, first: compared.first });
     }

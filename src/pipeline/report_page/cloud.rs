@@ -1,7 +1,7 @@
 //! The points of a page's viewer: some of the cloud, and what the depth maps say of each.
 
+use super::super::page_parts::{bounding_box, middle, spacing};
 use crate::error::Result;
-use crate::geometry::NearestIndex;
 use crate::report::{ClassRow, PageCloud, PageCloudClass, ViewerPoint, chosen, packed, shuffled};
 use crate::scene::{CloudLayout, DepthEstimate, PointSource};
 use crate::semantics::{ClassId, ClassTable};
@@ -14,14 +14,6 @@ use std::path::Path;
 
 /// A depth that differs from a point's by less than this share is that of the point.
 const SAME_DEPTH: f64 = 0.01;
-/// Share of the points at either end of each axis that may be far away.
-const OUTLIERS: f64 = 0.01;
-/// What the box holds beyond the others, as a share of their extent.
-const MARGIN: f64 = 0.5;
-/// Points that the distance between neighbours is taken from.
-const SPACING_SAMPLE: usize = 4096;
-/// Neighbours that tell it.
-const SPACING_NEIGHBORS: usize = 4;
 /// Most classes of the viewer; further ones share the last.
 const MOST_CLASSES: usize = 256;
 
@@ -188,110 +180,9 @@ fn name_of(
     (table.class_name(ClassId(id)).into_owned(), table.color(ClassId(id)))
 }
 
-/// Values of one axis, sorted.
-fn sorted_axis(points: &[ViewerPoint], axis: usize) -> Vec<f64> {
-    let mut values: Vec<f64> = points.iter().map(|p| p.position[axis]).collect();
-    values.par_sort_unstable_by(f64::total_cmp);
-    values
-}
-
-fn at_share(sorted: &[f64], share: f64) -> f64 {
-    sorted.get((share * sorted.len().saturating_sub(1) as f64).round() as usize).copied().unwrap_or(0.0)
-}
-
-/// Least corner and size of a box about the points, those that lie far from all others left out of it and of the points.
-fn bounding_box(points: &mut Vec<ViewerPoint>, labels: &mut Vec<u16>) -> ([f64; 3], [f64; 3]) {
-    let (mut min, mut max) = ([0.0f64; 3], [0.0f64; 3]);
-    for axis in 0..3 {
-        let values = sorted_axis(points, axis);
-        let (low, high) = (at_share(&values, OUTLIERS), at_share(&values, 1.0 - OUTLIERS));
-        let margin = MARGIN * (high - low);
-        (min[axis], max[axis]) = (low - margin, high + margin);
-    }
-    // A flat cloud has no extent along an axis, but points a little beside the others all the same.
-    let most = (0..3).map(|k| max[k] - min[k]).fold(0.0, f64::max);
-    for axis in 0..3 {
-        let (low, high) = (min[axis], max[axis]);
-        let missing = (0.1 * most - (high - low)).max(0.0) / 2.0;
-        (min[axis], max[axis]) = (low - missing, high + missing);
-    }
-    let inside = |p: &ViewerPoint| (0..3).all(|k| (min[k]..=max[k]).contains(&p.position[k]));
-    let keep: Vec<bool> = points.iter().map(inside).collect();
-    let mut kept = keep.iter();
-    points.retain(|_| *kept.next().unwrap_or(&false));
-    let mut kept = keep.iter();
-    labels.retain(|_| *kept.next().unwrap_or(&false));
-    // As tight as the points allow.
-    for axis in 0..3 {
-        let coordinate = |p: &ViewerPoint| p.position[axis];
-        min[axis] = points.iter().map(coordinate).fold(f64::INFINITY, f64::min);
-        max[axis] = points.iter().map(coordinate).fold(f64::NEG_INFINITY, f64::max);
-    }
-    if points.is_empty() {
-        return ([0.0; 3], [0.0; 3]);
-    }
-    (min, std::array::from_fn(|k| max[k] - min[k]))
-}
-
-/// Median coordinates relative to `min`, and the length across most of the points.
-fn middle(points: &[ViewerPoint], min: [f64; 3]) -> ([f64; 3], f64) {
-    let mut center = [0.0; 3];
-    let mut squared = 0.0;
-    for axis in 0..3 {
-        let values = sorted_axis(points, axis);
-        let (low, high) = (at_share(&values, 0.02), at_share(&values, 0.98));
-        center[axis] = (low + high) / 2.0 - min[axis];
-        squared += (high - low).powi(2);
-    }
-    (center, squared.sqrt())
-}
-
 /// Views of the point that only one in fifty has more of.
 fn most_views(points: &[ViewerPoint]) -> u32 {
     let mut views: Vec<u32> = points.iter().map(|p| p.views.min(127)).collect();
     views.par_sort_unstable();
     views.get(views.len().saturating_sub(1) * 49 / 50).copied().unwrap_or(0)
-}
-
-/// Median distance of a point to its fourth neighbour.
-fn spacing(points: &[ViewerPoint]) -> f64 {
-    let positions: Vec<[f64; 3]> = points.iter().map(|p| p.position).collect();
-    if positions.len() <= SPACING_NEIGHBORS {
-        return 0.0;
-    }
-    let index = NearestIndex::new(&positions);
-    let step = positions.len().div_ceil(SPACING_SAMPLE);
-    let sample: Vec<&[f64; 3]> = positions.iter().step_by(step).collect();
-    let mut distances: Vec<f64> = sample
-        .par_iter()
-        .filter_map(|p| index.nearest_n(p, SPACING_NEIGHBORS + 1).last().map(|n| n.squared.sqrt()))
-        .collect();
-    distances.sort_unstable_by(f64::total_cmp);
-    at_share(&distances, 0.5)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn at(x: f64, y: f64, z: f64) -> ViewerPoint {
-        ViewerPoint { position: [x, y, z], ..ViewerPoint::default() }
-    }
-
-    #[test]
-    fn stray_points_do_not_blow_up_the_box() {
-        let mut points: Vec<ViewerPoint> = (0..1000)
-            .map(|i| at(f64::from(i % 40), f64::from(i / 40), 5.0 + 0.001 * f64::from(i % 7)))
-            .collect();
-        points[17] = at(1e6, 0.0, 0.0);
-        let mut labels: Vec<u16> = (0..1000).collect();
-        let (min, extent) = bounding_box(&mut points, &mut labels);
-        assert_eq!((points.len(), labels.len()), (999, 999));
-        assert!(!labels.contains(&17) && labels[17] == 18);
-        assert_eq!((min[0], extent[0], min[1], extent[1]), (0.0, 39.0, 0.0, 24.0));
-        let (center, span) = middle(&points, min);
-        assert!((center[0] - 19.5).abs() < 1.0 && (40.0..46.0).contains(&span), "{center:?} {span}");
-        assert!((0.9..1.5).contains(&spacing(&points)));
-        assert_eq!(bounding_box(&mut Vec::new(), &mut Vec::new()), ([0.0; 3], [0.0; 3]));
-    }
 }

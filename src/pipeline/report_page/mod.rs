@@ -10,7 +10,7 @@ use super::labels_check::requests_of;
 use super::record::with_threads;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::report::{BARS, PageClass, PageView, ReportPage, RunReport, add_to, build, with_commit};
+use crate::report::{BARS, ClassRow, PageView, ReportPage, RunReport, add_to, build, fill_shares, with_commit};
 use crate::semantics::ClassTable;
 use crate::store::atomic::{check_writable, write_file};
 use crate::store::cloud::CloudFormat;
@@ -224,26 +224,21 @@ fn title(job: &ReportPageJob) -> String {
 }
 
 /// The classes that occur: as the run counted them, else by the points of the cloud.
-fn classes_of(run: &RunReport, table: Option<&ClassTable>, points: &BTreeMap<u16, u64>) -> Vec<PageClass> {
+fn classes_of(run: &RunReport, table: Option<&ClassTable>, points: &BTreeMap<u16, u64>) -> Vec<ClassRow> {
     if !run.classes.is_empty() {
         let rows = run.classes.iter().filter(|row| row.points + row.pixels > 0);
-        let class = |row: &crate::report::ClassRow| PageClass {
-            id: row.id,
-            name: row.name.clone(),
-            color: row.color,
-            points: row.points,
-            kept: row.kept,
-        };
-        return rows.map(class).collect();
+        return rows.cloned().collect();
     }
     let named = table.filter(|_| points.keys().any(|&id| id != 0));
     let Some(table) = named else { return Vec::new() };
     let class = |(&id, &points): (&u16, &u64)| {
         let id = crate::semantics::ClassId(id);
         let (name, color) = (table.class_name(id).into_owned(), table.color(id));
-        PageClass { id: id.0, name, color, points, kept: true }
+        ClassRow { id: id.0, name, color, points, kept: true, ..ClassRow::default() }
     };
-    points.iter().map(class).collect()
+    let mut rows: Vec<ClassRow> = points.iter().map(class).collect();
+    fill_shares(&mut rows);
+    rows
 }
 
 fn coverage(views: &[PageView]) -> [u64; BARS] {

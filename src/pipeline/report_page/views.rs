@@ -1,5 +1,6 @@
 //! The views of a page: their pictures, their cameras, and how well they match.
 
+use super::super::page_parts::{map_address, picture_size};
 use super::super::prepare::neighbors_of;
 use super::class_check::{self, SmallView};
 use super::cloud::ViewerCloud;
@@ -10,7 +11,7 @@ use crate::report::{
     BARS, PageCamera, PageCloud, PageView, RunReport, ViewReport, add_to, confidence_picture, data_address,
     depth_picture, depth_scale, label_picture, marked_picture, normal_picture,
 };
-use crate::scene::{ColorImage, DepthEstimate, Neighbor, ResolutionOptions, View, ViewIndex, resize_nearest};
+use crate::scene::{DepthEstimate, Neighbor, ResolutionOptions, View, ViewIndex, resize_nearest};
 use crate::store::depth_store::DepthStore;
 use crate::store::drawing::{jpeg_bytes, png_bytes};
 use crate::store::images::load_working_color;
@@ -21,14 +22,10 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Longest side of a picture.
-const MOST_SIDE: f64 = 480.0;
+/// Quality of photographs.
+const QUALITY: u8 = 70;
 /// Pixels of all pictures of one kind together: with more views they are smaller, so that pages of any number stay small.
 const MOST_PIXELS: f64 = 10e6;
-/// Share of a picture's longest side that the other is taken to have.
-const USUAL_SHAPE: f64 = 0.75;
-/// Quality of photographs and of maps.
-const QUALITY: (u8, u8) = (70, 60);
 /// Depths of a view that the common scale is taken from.
 const SCALE_SAMPLE: usize = 2048;
 /// Neighbours of a view that are drawn.
@@ -152,15 +149,16 @@ impl ViewLooks<'_> {
         if let Some(map) = seen.estimate.clone() {
             self.draw_maps(&map, count, seen)?;
         }
-        let longest = picture_size(Size::new(1 << 15, 1 << 15), count).longest();
-        let size_of_map = seen.estimate.as_ref().map(|map| picture_size(map.depth.size(), count));
+        let longest = picture_size(Size::new(1 << 15, 1 << 15), count, MOST_PIXELS).longest();
+        let size_of_map =
+            seen.estimate.as_ref().map(|map| picture_size(map.depth.size(), count, MOST_PIXELS));
         let at = size_of_map.map_or(longest, |size| size.longest());
         let resolution = ResolutionOptions { level: 0, max: at, ..ResolutionOptions::default() };
         let mut size = size_of_map;
         match load_working_color(&path, &resolution) {
             Ok(image) => {
                 size = size.or(Some(image.size()));
-                seen.page.layers.image = Some(data_address("image/jpeg", &jpeg_bytes(&image, QUALITY.0)?));
+                seen.page.layers.image = Some(data_address("image/jpeg", &jpeg_bytes(&image, QUALITY)?));
                 seen.small.iter_mut().for_each(|small| small.photograph = Some(image.clone()));
             }
             Err(error) if seen.page.dropped.is_none() => {
@@ -181,7 +179,7 @@ impl ViewLooks<'_> {
     }
 
     fn draw_maps(&self, map: &DepthEstimate, count: usize, seen: &mut Seen) -> Result<()> {
-        let size = picture_size(map.depth.size(), count);
+        let size = picture_size(map.depth.size(), count, MOST_PIXELS);
         let page = &mut seen.page;
         let depth = resize_nearest(&map.depth, size);
         if let Some(normals) = &map.normal {
@@ -206,19 +204,6 @@ impl ViewLooks<'_> {
         seen.small = Some(SmallView::new(map, depth, &origin));
         Ok(())
     }
-}
-
-/// Size of the pictures of a map: not above [`MOST_SIDE`], nor above its share of [`MOST_PIXELS`], nor above its own.
-fn picture_size(map: Size, count: usize) -> Size {
-    let share = (MOST_PIXELS / count.max(1) as f64 / USUAL_SHAPE).sqrt();
-    let longest = MOST_SIDE.min(share).max(64.0);
-    let factor = (longest / f64::from(map.longest().max(1))).min(1.0);
-    let side = |n: u32| ((f64::from(n) * factor).round() as u32).max(1);
-    Size::new(side(map.width), side(map.height))
-}
-
-fn map_address(picture: &ColorImage) -> Result<String> {
-    Ok(data_address("image/jpeg", &jpeg_bytes(picture, QUALITY.1)?))
 }
 
 /// Adds depths to the sample of the scale, and all confidences to the histogram.
@@ -306,17 +291,6 @@ fn page_camera(camera: &Camera, corner: [f64; 3]) -> PageCamera {
 mod tests {
     use super::*;
     use nalgebra::Matrix3;
-
-    #[test]
-    fn pictures_of_many_views_are_smaller() {
-        let map = Size::new(1600, 1200);
-        assert_eq!(picture_size(map, 6), Size::new(480, 360));
-        let many = picture_size(map, 200);
-        assert!((240..270).contains(&many.width), "{many}");
-        assert_eq!(picture_size(Size::new(200, 150), 6), Size::new(200, 150), "never larger than the map");
-        assert_eq!(picture_size(map, 1_000_000).width, 64);
-        assert_eq!(picture_size(Size::new(5000, 1), 1).height, 1);
-    }
 
     #[test]
     fn a_camera_looks_along_its_axis_through_its_corners() {

@@ -104,7 +104,7 @@ class CloudViewer {
   home() {
     const first = this.cameras[0];
     this.target = [...this.cloud.center];
-    this.distance = this.cloud.span * 0.95;
+    this.distance = this.cloud.span * 0.95 / Math.min(1, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight) / 1.2);
     this.up = first ? first.down.map(v => -v) : [0, 0, 1];
     const out = first ? first.axis.map(v => -v) : [0, -1, 0];
     this.orient(out);
@@ -190,8 +190,8 @@ class CloudViewer {
     const canvas = this.canvas, held = new Map();
     let moved = 0;
     canvas.addEventListener("contextmenu", e => e.preventDefault());
-    canvas.addEventListener("pointerdown", e => { canvas.setPointerCapture(e.pointerId); held.set(e.pointerId, [e.offsetX, e.offsetY]); moved = 0; });
-    canvas.addEventListener("pointerup", e => { held.delete(e.pointerId); if (moved < 4) this.pick(e.offsetX, e.offsetY); });
+    canvas.addEventListener("pointerdown", e => { canvas.setPointerCapture(e.pointerId); if (!held.size) moved = 0; held.set(e.pointerId, [e.offsetX, e.offsetY]); });
+    canvas.addEventListener("pointerup", e => { held.delete(e.pointerId); if (moved < 4 && e.button === 0 && !held.size) this.pick(e.offsetX, e.offsetY); });
     canvas.addEventListener("pointercancel", e => held.delete(e.pointerId));
     canvas.addEventListener("pointermove", e => {
       const before = held.get(e.pointerId);
@@ -208,8 +208,11 @@ class CloudViewer {
     });
     canvas.addEventListener("wheel", e => { e.preventDefault(); this.zoom(Math.exp(e.deltaY * (e.deltaMode ? 0.05 : 0.0015))); }, { passive: false });
     canvas.addEventListener("keydown", e => {
-      const act = { ArrowLeft: () => this.turn(-0.1, 0), ArrowRight: () => this.turn(0.1, 0), ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1), "+": () => this.zoom(0.85), "-": () => this.zoom(1.18), h: () => this.home() }[e.key];
-      if (act) { e.preventDefault(); act(); }
+      const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[e.key];
+      const act = step ? () => e.shiftKey ? this.pan(-40 * step[0], 40 * step[1]) : this.turn(0.1 * step[0], 0.1 * step[1])
+        : { "+": () => this.zoom(0.85), "=": () => this.zoom(0.85), "-": () => this.zoom(1.18), h: () => this.home() }[e.key];
+      // Keys with Ctrl or Alt are the browser's.
+      if (act && !e.ctrlKey && !e.altKey && !e.metaKey) { e.preventDefault(); act(); }
     });
   }
 
