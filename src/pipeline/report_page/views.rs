@@ -25,7 +25,7 @@ use std::sync::Arc;
 /// Quality of photographs.
 const QUALITY: u8 = 70;
 /// Pixels of all pictures of one kind together: with more views they are smaller, so that pages of any number stay small.
-const MOST_PIXELS: f64 = 10e6;
+const MOST_PIXELS: f64 = 7.5e6;
 /// Depths of a view that the common scale is taken from.
 const SCALE_SAMPLE: usize = 2048;
 /// Neighbours of a view that are drawn.
