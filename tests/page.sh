@@ -102,7 +102,7 @@ function checkViewer() {
   viewer.paintClasses();
   // Mouse, fingers, wheel and keys, each by what it changes.
   const canvas = at("viewer"), state = () => ({ turn: viewer.yaw, move: viewer.target.join(), zoom: viewer.distance });
-  const changes = act => { viewer.home(); viewer.render(); const before = state(); act(); const after = state(); return Object.keys(before).filter(k => before[k] !== after[k]).join("+"); };
+  const changes = act => { viewer.home(); viewer.matrix(); const before = state(); act(); const after = state(); return Object.keys(before).filter(k => before[k] !== after[k]).join("+"); };
   const drag = more => { pointer(canvas, "pointerdown", 100, 100, more); pointer(canvas, "pointermove", 140, 120, more); pointer(canvas, "pointerup", 140, 120, more); };
   const finger = (id, type, x) => pointer(canvas, type, x, 100, { pointerId: id, pointerType: "touch" });
   say("drag", changes(() => drag({})));

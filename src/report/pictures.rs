@@ -58,8 +58,7 @@ impl Ramp {
     /// The colour of `value`, which counts as 0 below 0 and where it is no number, and as 1 above 1.
     pub fn at(&self, value: f32) -> [u8; 3] {
         let last = self.0.len() - 1;
-        let value = if value > 0.0 { value.min(1.0) } else { 0.0 };
-        let place = value * last as f32;
+        let place = if value > 0.0 { value.min(1.0) * last as f32 } else { 0.0 };
         let below = (place as usize).min(last.saturating_sub(1));
         let (from, to) = (self.0[below], self.0[(below + 1).min(last)]);
         let share = place - below as f32;
