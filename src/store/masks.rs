@@ -33,7 +33,7 @@ pub(crate) fn load_mask(path: &Path, size: Size) -> Result<Grid<u16>> {
     let values: Vec<u16> = match image {
         DynamicImage::ImageLuma8(m) => m.into_raw().into_iter().map(u16::from).collect(),
         DynamicImage::ImageLuma16(m) => m.into_raw(),
-        DynamicImage::ImageLumaA8(m) => m.pixels().map(|p| p.0[0].into()).collect(),
+        DynamicImage::ImageLumaA8(m) => m.pixels().map(|p| u16::from(p.0[0])).collect(),
         DynamicImage::ImageLumaA16(m) => m.pixels().map(|p| p.0[0]).collect(),
         DynamicImage::ImageRgb8(m) => {
             m.pixels().map(|p| luma(p.0[0].into(), p.0[1].into(), p.0[2].into())).collect()
