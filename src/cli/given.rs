@@ -126,6 +126,8 @@ pub(super) fn check(command: &Command) -> Result<()> {
         Command::Compare(args) => {
             [&args.a, &args.b].into_iter().chain(&args.expect).try_for_each(|path| exists(path))
         }
+        // These take no file.
+        Command::Demo(_) | Command::Completions(_) | Command::Man(_) => Ok(()),
         Command::Report(args) => takes(
             &args.folder,
             &[Kind::Folder],

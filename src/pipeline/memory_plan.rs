@@ -117,13 +117,14 @@ impl MemoryPlan {
 
     /// The most that a run will take by this plan, if all its maps together have `pixels`.
     pub(super) fn most(&self, pixels: u64) -> u64 {
-        // Those of two passes side by side.
-        let maps = (self.maps as u64).min(2 * pixels * MAP_BYTES);
-        let grays = (self.grays as u64).min(pixels * size_of::<f32>() as u64);
-        let colors = (self.colors as u64).min(pixels * size_of::<[u8; 3]>() as u64);
-        let estimation = self.views_at_once as u64 * self.view + maps + grays;
-        let fusion = self.fusion.min(pixels * FUSED_BYTES) + colors + self.points.min(pixels * POINT_BYTES);
-        (BASE + self.decoded + estimation.max(fusion)).min(self.limit)
+        let kept = |budget: usize, bytes: u64| (budget as u64).min(pixels * bytes);
+        let colors = kept(self.colors, COLOR_BYTES);
+        // Maps of two passes are side by side.
+        let sources =
+            kept(self.maps, 2 * MAP_BYTES) + kept(self.texels, TEXEL_BYTES) + kept(self.planes, PLANE_BYTES);
+        let estimation = self.views_at_once as u64 * self.view + sources;
+        let fusion = self.fusion.min(pixels * FUSED_BYTES) + self.points.min(pixels * POINT_BYTES);
+        (BASE + self.decoded + colors + estimation.max(fusion)).min(self.limit)
     }
 }
 
@@ -144,8 +145,10 @@ mod tests {
         let plan = MemoryPlan {
             views_at_once: 2,
             maps: 176 << 20,
-            grays: 64 << 20,
+            filtered: 176 << 20,
             colors: 64 << 20,
+            texels: 64 << 20,
+            planes: 64 << 20,
             fusion: 256 << 20,
             points: 64 << 20,
             view: 75 << 20,
@@ -157,7 +160,7 @@ mod tests {
         assert!(most[0] > 200 << 20 && most[31] <= plan.limit, "{most:?}");
         let tight = MemoryPlan { limit: 300 << 20, ..plan };
         assert_eq!(tight.most(1 << 31), 300 << 20);
-        let fuses = MemoryPlan { view: 0, maps: 0, grays: 0, ..plan };
+        let fuses = MemoryPlan { view: 0, maps: 0, texels: 0, planes: 0, ..plan };
         assert!(fuses.most(1 << 20) < plan.most(1 << 20));
     }
 }

@@ -107,7 +107,7 @@ fn a_run_writes_its_page_itself() {
     assert!(out.stdout.contains("out/page.html: 6 views"), "{}", out.stdout);
     let page = Page::read(&scratch, "out/page.html");
     assert_eq!(page.data["program"], "semvs densify");
-    assert_eq!(page.data["version"], semvs::report::build());
+    assert_eq!(page.data["version"], semvs::internals::report::build());
     assert_eq!(page.layers(3)[..5], ["image", "depth", "normal", "confidence", "labels"]);
     assert_ne!(page.data["peak_memory"].is_null(), cfg!(target_os = "linux"));
     let json: Value = serde_json::from_slice(&scratch.read("out/r.json")).unwrap();

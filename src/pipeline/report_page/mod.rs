@@ -10,7 +10,9 @@ use super::labels_check::requests_of;
 use super::record::with_threads;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::report::{BARS, ClassRow, PageView, ReportPage, RunReport, add_to, build, fill_shares, with_commit};
+use crate::report::{
+    BARS, ClassRow, PageView, ReportPage, RunReport, add_to, build, fill_shares, with_commit,
+};
 use crate::semantics::ClassTable;
 use crate::store::atomic::{check_writable, write_file};
 use crate::store::cloud::CloudFormat;
