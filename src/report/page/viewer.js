@@ -69,8 +69,16 @@ class CloudViewer {
     return array;
   }
 
+  /// A part of the cloud's size, but not so much that neighbouring cameras hide each other.
+  frustumLength() {
+    const centers = this.cameras.map(c => c.center), step = Math.ceil(centers.length / 200) || 1;
+    const nearest = centers.filter((_, i) => i % step === 0).map(p => Math.min(...centers.filter(q => q !== p).map(q => Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]))));
+    const usual = nearest.sort((a, b) => a - b)[nearest.length >> 1] ?? Infinity;
+    return Math.max(Math.min(0.04 * this.cloud.span, 0.6 * usual), 0.001 * this.cloud.span);
+  }
+
   frustumLines() {
-    const gl = this.gl, out = [], span = this.cloud.span * 0.04;
+    const gl = this.gl, out = [], span = this.frustumLength();
     for (const { center, corners } of this.cameras) {
       const tips = corners.map(c => c.map((v, i) => center[i] + v * span));
       tips.forEach((tip, i) => out.push(...center, ...tip, ...tip, ...tips[(i + 1) % 4]));
