@@ -184,7 +184,7 @@ impl Densify {
         let listener = Arc::new(Ears { observer: self.observer.clone(), ..Ears::default() });
         let mut report = pipeline::densify(&job, CpuLevel::detect(), &Progress::new(listener.clone()))?;
         report.program = "semvs::Densify".to_owned();
-        report.version = env!("CARGO_PKG_VERSION").to_owned();
+        report.version = crate::report::VERSION.to_owned();
         report.warnings = listener.warnings();
         Ok(Summary { report })
     }

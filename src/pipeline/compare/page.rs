@@ -4,7 +4,7 @@ use super::pictures::{SmallPair, pictures};
 use super::points::compared_points;
 use super::{CompareJob, Outcome};
 use crate::error::{Error, Result};
-use crate::report::{ComparisonPage, PageCheck, PagePair};
+use crate::report::{ComparisonPage, PageCheck, PagePair, build};
 use crate::scene::PointCloud;
 use crate::store::atomic::write_file;
 use std::path::Path;
@@ -48,7 +48,7 @@ pub(super) fn write(job: &CompareJob, outcome: &Outcome, looks: &Looks, path: &P
         a: job.a.display().to_string(),
         b: job.b.display().to_string(),
         kind: comparison.kind.name(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
+        version: build(),
         figures: (&comparison.figures).into(),
         checks: outcome.checks.as_ref().map(|checks| checks.iter().map(PageCheck::from).collect()),
         notes: comparison.notes.clone(),
