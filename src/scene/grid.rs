@@ -46,7 +46,8 @@ impl<T> Grid<T> {
     /// The value at column `x`, row `y`, or `None` outside.
     #[inline]
     pub fn get(&self, x: usize, y: usize) -> Option<&T> {
-        if x < self.width() { self.data.get(self.index(x, y)) } else { None }
+        let is_inside = x < self.width() && y < self.height();
+        if is_inside { self.data.get(self.index(x, y)) } else { None }
     }
 
     /// Row `y`.

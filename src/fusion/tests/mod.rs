@@ -26,7 +26,7 @@ impl TestScene {
 
     fn of(estimates: Vec<DepthEstimate>) -> Self {
         let maps = estimates.into_iter().enumerate().map(|(i, estimate)| {
-            let color = Grid::filled(estimate.depth.size(), [10 * i as u8, 100, 200]);
+            let color = Grid::filled(estimate.depth.size(), [(10 * i) as u8, 100, 200]);
             FusionMaps { color: Some(Arc::new(color)), ..FusionMaps::new(Arc::new(estimate)) }
         });
         TestScene { maps: maps.collect() }
