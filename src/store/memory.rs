@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// for.
 const SHARE: f64 = 0.7;
 
+/// What counts as without bound: more than any machine has, and small enough to be reckoned with.
+const UNBOUNDED: u64 = u64::MAX >> 4;
+
 /// Bytes that a run may take in all: `typed`, else 70 % of what the machine has or the control group allows; without
 /// bound where nothing is known.
 pub(crate) fn allowed(typed: Option<u64>) -> u64 {
@@ -15,7 +18,7 @@ pub(crate) fn allowed(typed: Option<u64>) -> u64 {
     let share = there.map(|bytes| (bytes as f64 * SHARE) as u64);
     let stated = std::env::var(LIMIT_VARIABLE).ok().and_then(|v| v.trim().parse::<u64>().ok());
     let default = [share, stated.map(|mib| mib << 20)].into_iter().flatten().min();
-    typed.or(default).unwrap_or(u64::MAX >> 1)
+    typed.or(default).unwrap_or(UNBOUNDED).min(UNBOUNDED)
 }
 
 /// Largest resident size of this process so far, bytes.
@@ -112,6 +115,13 @@ mod tests {
         assert_eq!(left_in(folder.path()), Some(300));
         write("memory.stat", "anon 1\ninactive_file 200\n");
         assert_eq!(left_in(folder.path()), Some(500));
+    }
+
+    #[test]
+    fn any_bound_can_be_reckoned_with() {
+        assert_eq!(allowed(Some(5 << 20)), 5 << 20);
+        assert!(allowed(Some(u64::MAX)).checked_mul(8).is_some());
+        assert!(allowed(None).checked_mul(8).is_some());
     }
 
     #[test]
