@@ -30,8 +30,12 @@ fn packaged(root: &Path) -> Option<String> {
     rest.split('"').nth(1).filter(|word| is_commit(word)).map(str::to_owned)
 }
 
-/// From git, if `root` is the top of a working tree and not only somewhere within one.
+/// From git, if `root` is the top of a working tree and not only somewhere within one. Only for release builds: with others
+/// every commit would mean to compile everything anew.
 fn checked_out(root: &Path) -> Option<String> {
+    if std::env::var("PROFILE").is_ok_and(|profile| profile != "release") {
+        return None;
+    }
     let top = PathBuf::from(git(root, &["rev-parse", "--show-toplevel"])?);
     if top.canonicalize().ok()? != root.canonicalize().ok()? {
         return None;

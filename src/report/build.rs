@@ -3,7 +3,8 @@
 /// The version of the programs.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The commit that they are built from, twelve digits; `None` where the build could not tell.
+/// The commit that they are built from, twelve digits; `None` where the build could not tell, as those that are not for
+/// release.
 pub fn commit() -> Option<&'static str> {
     Some(env!("SEMVS_COMMIT")).filter(|commit| !commit.is_empty())
 }

@@ -89,7 +89,11 @@ fn version_is_a_result_and_tells_the_kernels() {
 }
 
 #[test]
-fn the_commit_is_that_of_the_working_tree() {
+fn release_builds_tell_the_commit_of_the_working_tree() {
+    if cfg!(debug_assertions) {
+        println!("skipped: not a release build");
+        return;
+    }
     let git = std::process::Command::new("git")
         .args(["rev-parse", "--show-toplevel", "HEAD"])
         .current_dir(env!("CARGO_MANIFEST_DIR"))
