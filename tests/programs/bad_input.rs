@@ -564,7 +564,9 @@ fn clouds_that_cannot_be_judged() {
     scratch.write("empty.ply", format!("{empty}end_header\n"));
     judge("empty.ply").fails_naming(&["empty.ply", "no points"]);
     std::fs::copy(common::facade6().join("images/0003.jpg"), scratch.path("image.ply")).unwrap();
-    judge("image.ply").fails_naming(&["image.ply", "no PLY file"]);
+    judge("image.ply").fails_naming(&["image.ply", "this is a picture", "PLY"]);
+    scratch.write("text.ply", "plain text\n");
+    judge("text.ply").fails_naming(&["text.ply", "no PLY file"]);
     scratch.write("escape.ply", b"ply\nformat \x1b[2Jascii\x07 1.0\nend_header\n");
     let out = judge("escape.ply").fails_naming(&["escape.ply", "u{1b}"]);
     assert!(!out.stderr.contains(['\x1b', '\x07']), "{:?}", out.stderr);

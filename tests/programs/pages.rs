@@ -151,7 +151,7 @@ fn what_a_page_cannot_show_is_said_and_left_out() {
 fn pages_that_cannot_be_are_refused_in_one_line() {
     let scratch = fused();
     let report = |words: &str| scratch.semvs(&format!("report {words}"));
-    report("nothing").fails_naming(&["nothing", "no such folder"]);
+    report("nothing").fails_naming(&["nothing", "no such file or folder"]);
     report("labels").fails_naming(&["labels", "no scene (.mvs)", "--scene"]);
     report("out -o out/a.ply").fails_naming(&["out/a.ply", ".html"]);
     report("out --points 0").fails_naming(&["--points"]);
