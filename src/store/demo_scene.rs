@@ -1,6 +1,6 @@
 //! The scene that comes with the program.
 
-use super::atomic::write_file;
+use super::atomic::{create_folder, write_file};
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -35,7 +35,8 @@ const FILES: [(&str, &[u8]); 13] = [
 /// `folder` holds other things, a file of the scene was changed, or a file cannot be read or written.
 pub(crate) fn unpack(folder: &Path, scene: &Path) -> Result<()> {
     let is_known = scene.join(FILES[0].0).is_file();
-    if !is_known && folder.exists() && !is_empty(folder)? {
+    create_folder(folder)?;
+    if !is_known && !is_empty(folder)? {
         let what = "this folder holds other files; give a new or an empty one (-o)";
         return Err(Error::content(folder, what));
     }
@@ -56,9 +57,6 @@ pub(crate) fn unpack(folder: &Path, scene: &Path) -> Result<()> {
 }
 
 fn is_empty(folder: &Path) -> Result<bool> {
-    if !folder.is_dir() {
-        return Err(Error::content(folder, "a file is in the way of this folder; give another one (-o)"));
-    }
     let mut entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
     Ok(entries.next().is_none())
 }
