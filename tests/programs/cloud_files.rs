@@ -222,7 +222,7 @@ fn a_table_of_150_classes_and_ids_of_two_bytes_change_no_point() {
         assert_eq!((ade.labels[i], wide.labels[i]), (id, if id > 0 { 1000 + id } else { 0 }));
     }
     let codes = |name: &str| -> Vec<u16> {
-        las_points(&scratch.path(name)).iter().map(|p| u8::from(p.classification).into()).collect()
+        las_points(&scratch.path(name)).iter().map(|p| u16::from(u8::from(p.classification))).collect()
     };
     assert!(
         codes("ade.laz").iter().zip(&ade.labels).all(|(code, id)| *code == if *id > 0 { 64 + id } else { 1 })

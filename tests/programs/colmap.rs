@@ -1,6 +1,8 @@
 //! COLMAP as a host: its workspace in place of a scene, its depth maps in place of ours, and the way back.
 
-use crate::common::{self, Scratch, facade6};
+#[cfg(unix)]
+use crate::common;
+use crate::common::{Scratch, facade6};
 use semvs_formats::colmap::{Encoding, Matrix, Model, NO_POINT, parse_patch_match_config, read_visibility};
 use semvs_formats::{Limits, dmap::DepthMapFile, mvs, ply};
 use std::path::Path;

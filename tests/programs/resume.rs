@@ -1,7 +1,11 @@
 //! Runs that are repeated, interrupted, killed, started twice.
 
-use crate::common::{SEMVS, SMALL, Scratch};
+#[cfg(unix)]
+use crate::common::SEMVS;
+use crate::common::{SMALL, Scratch};
+#[cfg(unix)]
 use std::process::{Command, Stdio};
+#[cfg(unix)]
 use std::time::{Duration, Instant};
 
 /// Small maps, quickly, with all stages.
