@@ -11,7 +11,7 @@ use crate::stereo::{CpuLevel, StereoOptions};
 use std::time::Duration;
 
 /// Processor seconds per pixel and pass over it, at normal quality with the AVX-512 kernels.
-const PASS: f64 = 0.65e-6;
+const PASS: f64 = 0.42e-6;
 /// Share of that without any source view, and what each source view adds to it; five make the whole.
 const BY_SOURCES: (f64, f64) = (0.42, 0.116);
 /// Passes as long as a geometric one is: it compares one view more.

@@ -63,9 +63,9 @@ const MAPS_KEPT: (u64, u64) = (1, 4);
 /// The same for colours, texels and planes.
 const OTHERS: (u64, u64) = (32 << 20, 4 << 30);
 /// Memory for colours where nothing is estimated: each is needed once to see whether it can be read, once for the points.
-const COLORS: u64 = 8 << 20;
+const COLORS: u64 = 4 << 20;
 /// Least memory for the maps that fusion works on, where there is enough; else half as much again as those of a turn.
-const FUSION: u64 = 24 << 20;
+const FUSION: u64 = 12 << 20;
 
 impl MemoryPlan {
     /// Shares out what `job` may take for views with these cameras; `estimates`: depth maps are made.

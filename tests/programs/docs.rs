@@ -352,6 +352,7 @@ const FOREIGN: &[&str] = &[
     "--name",
     "--open",
     "--palette",
+    "--path",
     "--pc-quality",
     "--release",
     "--test",

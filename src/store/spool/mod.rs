@@ -16,7 +16,7 @@ use crate::scene::{CloudLayout, CloudPoint, PointSink, PointSource};
 use std::path::Path;
 
 /// Bytes of points that a spool holds in memory by default.
-pub const DEFAULT_SPOOL_MEMORY: u64 = 8 << 20;
+pub const DEFAULT_SPOOL_MEMORY: u64 = 4 << 20;
 
 /// Takes the points of a cloud one by one.
 #[derive(Debug)]
