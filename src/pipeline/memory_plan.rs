@@ -1,7 +1,6 @@
 //! How the memory that a run may take is shared out, decided before any long work.
 
 use super::job::SceneJob;
-use super::prepare::pixels_in_hand;
 use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -77,7 +76,7 @@ impl MemoryPlan {
         let threads = rayon::current_num_threads();
         let sources = most_sources(job) as u64;
         let area = cameras.iter().flatten().map(|c| c.size().area() as u64).max().unwrap_or(0);
-        let in_hand = pixels_in_hand(job, cameras) as u64;
+        let in_hand = pixels_in_hand(job, cameras);
         let decoded = area * DECODED_BYTES * threads as u64;
         let one = area * (VIEW_BYTES + SOURCE_BYTES * sources);
         let group = area * FUSED_BYTES * (1 + (job.neighbors.max_views as u64).max(sources));
@@ -126,6 +125,13 @@ impl MemoryPlan {
         let fusion = self.fusion.min(pixels * FUSED_BYTES) + self.points.min(pixels * POINT_BYTES);
         (BASE + self.decoded + colors + estimation.max(fusion)).min(self.limit)
     }
+}
+
+/// Pixels of the views that all threads work on at a time: each on a view and its neighbours.
+fn pixels_in_hand(job: &SceneJob, cameras: &[Option<Camera>]) -> u64 {
+    let pixels = || cameras.iter().flatten().map(|c| c.size().area() as u64);
+    let views = rayon::current_num_threads() * (1 + most_sources(job).max(MAX_NEIGHBORS));
+    (views as u64 * pixels().max().unwrap_or(0)).min(pixels().sum())
 }
 
 /// Largest number of views that one is matched with.

@@ -8,7 +8,6 @@ use super::outputs::check_places;
 use super::skip::Labels;
 use super::sparse::{override_from_file, replace_points};
 use super::tower::use_tower;
-use crate::depth_filter::MAX_NEIGHBORS;
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Placement, local_origin};
 use crate::progress::{Event, Progress, SceneSummary};
@@ -208,14 +207,6 @@ fn find_neighbors(
 /// As [`select_neighbors`].
 pub(super) fn neighbors_of(scene: &Scene, cameras: &[Option<Camera>]) -> Result<Vec<ViewNeighbors>> {
     select_neighbors(scene, cameras, &NeighborOptions::default())
-}
-
-/// Pixels of the views that all threads work on at a time: each on a view and its neighbours.
-pub(super) fn pixels_in_hand(job: &SceneJob, cameras: &[Option<Camera>]) -> usize {
-    let pixels = cameras.iter().flatten().map(|c| c.size().area()).max().unwrap_or(0);
-    let neighbors =
-        if job.neighbors.number_views == 0 { job.neighbors.max_views } else { job.neighbors.number_views };
-    rayon::current_num_threads() * (1 + neighbors.max(MAX_NEIGHBORS)) * pixels
 }
 
 /// Why calibrated views have no camera.
