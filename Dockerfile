@@ -6,8 +6,7 @@ WORKDIR /semvs
 COPY . .
 # The repository is not there to tell.
 ARG COMMIT=
-RUN SEMVS_COMMIT=$COMMIT CARGO_PROFILE_RELEASE_DEBUG=0 CARGO_PROFILE_RELEASE_STRIP=symbols \
-    cargo build --locked --release --bins
+RUN SEMVS_COMMIT=$COMMIT cargo build --locked --release --bins
 
 # No packages are added: the programs need libc and libgcc, which the base has.
 FROM debian:bookworm-slim
