@@ -2,6 +2,7 @@
 //! Names, meanings and defaults are those of OpenMVS 2.3.0.
 
 use super::values::{boolean, bytes};
+use crate::fusion::Support;
 use crate::stereo::Quality;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -88,9 +89,10 @@ pub(crate) struct EstimationOptions {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Filtering and fusion")]
 pub(crate) struct FusionOptions {
-    /// Filters on the depth maps, a sum of: 1 = remove speckles, 2 = fill gaps, 4 = filter across views
-    #[arg(long, value_name = "BITS", default_value_t = 7)]
-    pub(crate) postprocess_dmaps: u32,
+    /// Filters on the depth maps, a sum of: 1 = remove speckles, 2 = fill gaps, 4 = filter across views [default: 4
+    /// with the unbiased filter, 5 if there are labels or masks, 7 with OpenMVS's]
+    #[arg(long, value_name = "BITS")]
+    pub(crate) postprocess_dmaps: Option<u32>,
     /// The filter across views [default: unbiased in semvs, openmvs in DensifyPointCloud]
     #[arg(long, value_name = "FILTER", value_enum)]
     pub(crate) filter: Option<FilterKind>,
@@ -98,6 +100,9 @@ pub(crate) struct FusionOptions {
     /// depth becomes a point
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub(crate) number_views_fuse: u32,
+    /// Depths of other images that count towards a point [default: all in semvs, unclaimed in DensifyPointCloud]
+    #[arg(long, value_name = "DEPTHS", value_enum)]
+    pub(crate) support: Option<SupportKind>,
     /// Colours: 0 = none, 1 = of the nearest image after fusion, 2 = averaged during fusion
     #[arg(long, value_name = "MODE", default_value_t = 2)]
     pub(crate) estimate_colors: u32,
@@ -136,6 +141,24 @@ pub(crate) enum FilterKind {
     Openmvs,
     /// depths stay as they are or are dropped
     Unbiased,
+}
+
+/// `--support`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SupportKind {
+    /// all that agree: a depth makes one point and can support others
+    All,
+    /// OpenMVS's: those that no other point has claimed
+    Unclaimed,
+}
+
+impl From<SupportKind> for Support {
+    fn from(kind: SupportKind) -> Self {
+        match kind {
+            SupportKind::All => Support::All,
+            SupportKind::Unclaimed => Support::Unclaimed,
+        }
+    }
 }
 
 /// What part of the scene is wanted.

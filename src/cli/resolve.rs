@@ -8,7 +8,7 @@ use super::label_options::{
 use super::options::{FilterKind, SharedOptions};
 use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
-use crate::fusion::{AttributeSource, FusionOptions};
+use crate::fusion::{AttributeSource, FusionOptions, Support};
 use crate::pipeline::{
     AcrossViews, FilterJob, LabelJob, MaskJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork,
 };
@@ -137,8 +137,6 @@ impl<'a> Resolver<'a> {
         let typed = &self.options.estimation;
         let own = StereoOptions::of(typed.quality.map_or(default, Quality::from));
         let (config, openmvs) = (&self.config, DenseConfig::default());
-        // OpenMVS's defaults are those of its estimator; a file that repeats them asks for nothing.
-        let asked = |value: f32, default: f32, own: f32| if value == default { own } else { value };
         let options = StereoOptions {
             levels: typed.sub_resolution_levels,
             iterations: typed.iters,
@@ -158,10 +156,22 @@ impl<'a> Resolver<'a> {
     /// Values out of range.
     pub(crate) fn filter(&self, bits_are_typed: bool, default: FilterKind) -> Result<FilterJob> {
         let config = &self.config;
-        let typed = self.options.fusion.postprocess_dmaps;
+        let own = match self.options.fusion.filter.unwrap_or(default) {
+            FilterKind::Openmvs => FilterJob::openmvs(),
+            FilterKind::Unbiased => {
+                let masked = self.options.images.ignore_mask_label >= 0;
+                FilterJob::unbiased(masked || has_labels(&self.options.labels.input))
+            }
+        };
+        let typed = self.options.fusion.postprocess_dmaps.unwrap_or(own.bits());
         let bits = config.optimize.filter(|_| !bits_are_typed).unwrap_or(typed);
+        let openmvs = DenseConfig::default();
         let options = DepthFilterOptions {
-            depth_diff_threshold: config.depth_diff_threshold,
+            depth_diff_threshold: asked(
+                config.depth_diff_threshold,
+                openmvs.depth_diff_threshold,
+                own.options.depth_diff_threshold,
+            ),
             speckle_size: config.speckle_size,
             interpolate_gap_size: config.interpolate_gap_size,
             min_views_filter: config.min_views_filter,
@@ -169,22 +179,23 @@ impl<'a> Resolver<'a> {
             filter_adjust: config.filter_adjust != 0,
         };
         options.check()?;
-        let across = match self.options.fusion.filter.unwrap_or(default) {
-            FilterKind::Openmvs => AcrossViews::OpenMvs,
-            FilterKind::Unbiased => AcrossViews::Unbiased(UnbiasedFilterOptions {
+        let across = match own.across {
+            Some(AcrossViews::Unbiased(own)) => AcrossViews::Unbiased(UnbiasedFilterOptions {
                 max_depth_diff: config.depth_diff_threshold,
                 min_confirming: config.min_views_filter_adjust,
-                ..UnbiasedFilterOptions::default()
+                ..own
             }),
+            Some(AcrossViews::OpenMvs) | None => AcrossViews::OpenMvs,
         };
         FilterJob::from_bits(bits, across, options)
     }
 
-    /// Fusion; `agreeing_on_class`: the fewest images of a point where labels are compared, if not what is typed.
+    /// Fusion; `support`: what counts unless typed; `agreeing_on_class`: the fewest images of a point where labels are
+    /// compared, if not what is typed.
     ///
     /// # Errors
     /// Values out of range.
-    pub(crate) fn fusion(&self, agreeing_on_class: Option<u32>) -> Result<FusionOptions> {
+    pub(crate) fn fusion(&self, support: Support, agreeing_on_class: Option<u32>) -> Result<FusionOptions> {
         let typed = &self.options.fusion;
         let compared = has_labels(&self.options.labels.input)
             && rules(&self.options.labels.input).consistency != Consistency::Off;
@@ -194,17 +205,36 @@ impl<'a> Resolver<'a> {
                 Error::invalid(format!("{option} {level}: give 0 (none), 1 (after fusion) or 2"))
             })
         };
+        let own = match typed.support.map_or(support, Support::from) {
+            Support::All => FusionOptions::supporting(),
+            Support::Unclaimed => FusionOptions::default(),
+        };
+        let (config, openmvs) = (&self.config, DenseConfig::default());
         let options = FusionOptions {
             number_views_fuse: fewest,
-            depth_diff_threshold: self.config.depth_diff_threshold,
-            normal_diff_threshold_deg: self.config.normal_diff_threshold_deg,
+            depth_diff_threshold: asked(
+                config.depth_diff_threshold,
+                openmvs.depth_diff_threshold,
+                own.depth_diff_threshold,
+            ),
+            normal_diff_threshold_deg: asked(
+                config.normal_diff_threshold_deg,
+                openmvs.normal_diff_threshold_deg,
+                own.normal_diff_threshold_deg,
+            ),
             estimate_colors: source(typed.estimate_colors, "--estimate-colors")?,
             estimate_normals: source(typed.estimate_normals, "--estimate-normals")?,
-            ..FusionOptions::default()
+            ..own
         };
         options.check()?;
         Ok(options)
     }
+}
+
+/// A value of the dense config file, or `own`: OpenMVS's defaults suit its methods; a file that repeats them asks for
+/// nothing.
+fn asked(value: f32, openmvs: f32, own: f32) -> f32 {
+    if value == openmvs { own } else { value }
 }
 
 /// What `--tower-mode` asks for; the cloud of a tower goes to `cloud`.

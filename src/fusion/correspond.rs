@@ -2,7 +2,7 @@
 //! there? Reads only what cannot change while the view has its turn, so rows are independent.
 
 use super::participant::{Participant, Pixel};
-use super::state::FreePixels;
+use super::state::PixelStates;
 use crate::geometry::is_similar_depth;
 use crate::semantics::{Agreement, ClassPolicy};
 
@@ -71,29 +71,29 @@ pub(super) struct RowScratch {
 const OUTSIDE: u32 = u32::MAX;
 
 impl RowMatches {
-    /// Fills in row `y` of `views[0]` against the other views; `free` is parallel to `views` and may be from before: a
-    /// pixel that is no longer free is found to be taken when points are made.
+    /// Fills in row `y` of `views[0]` against the other views; `states` are parallel to `views` and may be from
+    /// before: a pixel that no longer supports others is found to be taken when points are made.
     pub(super) fn compute(
         &mut self,
         scratch: &mut RowScratch,
         views: &[Participant<'_>],
-        free: &[FreePixels],
+        states: &[PixelStates],
         y: u32,
         matching: &Matching<'_>,
     ) {
-        let (Some((reference, neighbors)), Some((own_free, others_free))) =
-            (views.split_first(), free.split_first())
+        let (Some((reference, neighbors)), Some((own_states, others_states))) =
+            (views.split_first(), states.split_first())
         else {
             return;
         };
-        self.start_row(scratch, reference, own_free, y, matching);
+        self.start_row(scratch, reference, own_states, y, matching);
         self.correspondences.reserve_exact(self.columns.len() * neighbors.len());
-        for (neighbor, free) in neighbors.iter().zip(others_free) {
+        for (neighbor, states) in neighbors.iter().zip(others_states) {
             scratch.project(neighbor);
             let row = y as usize * reference.width as usize;
             let projected = scratch.pixels.iter().zip(&scratch.depths).zip(&scratch.normals);
             let found = projected.zip(&self.columns).map(|(((&pixel, &depth), &normal), &x)| {
-                if pixel == OUTSIDE || !free.contains(pixel) {
+                if pixel == OUTSIDE || !states.supports(pixel) {
                     return Correspondence::default();
                 }
                 let own = row + x as usize;
@@ -116,7 +116,7 @@ impl RowMatches {
         &mut self,
         scratch: &mut RowScratch,
         reference: &Participant<'_>,
-        free: &FreePixels,
+        states: &PixelStates,
         y: u32,
         matching: &Matching<'_>,
     ) {
@@ -125,7 +125,7 @@ impl RowMatches {
         scratch.normals.clear();
         scratch.points.iter_mut().for_each(Vec::clear);
         let start = y as usize * reference.width as usize;
-        for pixel in free.in_range(start, start + reference.width as usize) {
+        for pixel in states.free_in_range(start, start + reference.width as usize) {
             if matching.policy.is_some_and(|policy| !policy.is_candidate(reference.label(pixel))) {
                 continue;
             }

@@ -3,7 +3,7 @@
 
 use super::correspond::{Relation, RowMatches};
 use super::participant::Participant;
-use super::state::FreePixels;
+use super::state::PixelStates;
 use super::summary::Tally;
 use crate::semantics::{ClassPolicy, Consistency, LabelVote, Vote};
 
@@ -24,7 +24,7 @@ pub(super) struct Claim {
     pub(super) label: LabelVote,
 }
 
-/// The points of one row and the neighbour pixels they have claimed.
+/// The points of one row and the neighbour pixels that support them.
 #[derive(Default)]
 pub(super) struct RowClaims {
     pub(super) claims: Vec<Claim>,
@@ -36,6 +36,8 @@ pub(super) struct Merger<'a> {
     pub(super) min_views: usize,
     /// `None`: labels take no part.
     pub(super) policy: Option<&'a ClassPolicy>,
+    /// Members that the candidate at hand has claimed.
+    claimed: Vec<Member>,
     behind: Vec<Member>,
     dissenters: Vec<Member>,
     vote: Vote,
@@ -51,17 +53,24 @@ enum Outcome {
 
 impl<'a> Merger<'a> {
     pub(super) fn new(min_views: usize, policy: Option<&'a ClassPolicy>) -> Self {
-        Merger { min_views, policy, behind: Vec::new(), dissenters: Vec::new(), vote: Vote::default() }
+        Merger {
+            min_views,
+            policy,
+            claimed: Vec::new(),
+            behind: Vec::new(),
+            dissenters: Vec::new(),
+            vote: Vote::default(),
+        }
     }
 
-    /// Turns the candidates of row `y` into points; `free` is parallel to `views` and loses the pixels that points
+    /// Turns the candidates of row `y` into points; `states`, parallel to `views`, remember the pixels that points
     /// claim or push away. `invalidated` counts the latter by view.
     pub(super) fn merge_row(
         &mut self,
         views: &[Participant<'_>],
         y: u32,
         row: &RowMatches,
-        free: &mut [FreePixels],
+        states: &mut [PixelStates],
         out: &mut RowClaims,
         tally: &mut Tally,
     ) {
@@ -70,12 +79,12 @@ impl<'a> Merger<'a> {
         for (i, &x) in row.columns.iter().enumerate() {
             let own = y * views[0].width + x;
             let start = out.members.len();
-            self.collect(row, i, views.len() - 1, free, out);
+            self.collect(row, i, views.len() - 1, states, out);
             match self.judge(views, own, &out.members[start..]) {
                 Outcome::Point(label) => {
-                    free[0].take(own);
+                    states[0].claim(own);
                     for hidden in &self.behind {
-                        free[hidden.view as usize].take(hidden.pixel);
+                        states[hidden.view as usize].invalidate(hidden.pixel);
                         tally.invalidated[hidden.view as usize] += 1;
                     }
                     tally.add_point(label);
@@ -88,48 +97,61 @@ impl<'a> Merger<'a> {
                 }
                 Outcome::ExcludedLabel => tally.class(views[0].label(own as usize)).rejected_by_class += 1,
             }
-            for member in out.members.drain(start..) {
-                free[member.view as usize].give_back(member.pixel);
+            out.members.truncate(start);
+            for member in &self.claimed {
+                states[member.view as usize].give_back(member.pixel);
             }
         }
     }
 
-    /// Claims the free pixels that agree with candidate `i` and notes the others of interest.
+    /// Gathers the pixels that support candidate `i`, claims the free ones of them, and notes the others of interest.
     fn collect(
         &mut self,
         row: &RowMatches,
         i: usize,
         neighbors: usize,
-        free: &mut [FreePixels],
+        states: &mut [PixelStates],
         out: &mut RowClaims,
     ) {
+        self.claimed.clear();
         self.behind.clear();
         self.dissenters.clear();
         for neighbor in 0..neighbors {
             let Some((relation, pixel)) = row.get(neighbor, i) else { continue };
-            if !free[neighbor + 1].contains(pixel) {
+            let states = &mut states[neighbor + 1];
+            if !states.supports(pixel) {
                 continue;
             }
             let member = Member { view: neighbor as u32 + 1, pixel };
             match relation {
                 Relation::Agrees => {
-                    free[neighbor + 1].take(pixel);
+                    if states.is_free(pixel) {
+                        states.claim(pixel);
+                        self.claimed.push(member);
+                    }
                     out.members.push(member);
                 }
                 Relation::Dissents => self.dissenters.push(member),
-                Relation::Behind => self.behind.push(member),
+                Relation::Behind if states.is_free(pixel) => self.behind.push(member),
+                Relation::Behind => {}
             }
         }
     }
 
     fn judge(&mut self, views: &[Participant<'_>], own: u32, members: &[Member]) -> Outcome {
-        let enough = members.len() + 1 >= self.min_views;
+        let (unclaimed, all) = (self.claimed.len() + 1, members.len() + 1);
+        // Depths that have made a point already are no news: where they are needed, one more is asked for.
+        let enough = unclaimed >= self.min_views || all > self.min_views;
         let Some(policy) = self.policy else {
             return if enough { Outcome::Point(LabelVote::default()) } else { Outcome::TooFewViews };
         };
         if !enough {
-            let missed = members.len() + 1 + self.dissenters.len() >= self.min_views;
-            return if missed { Outcome::InconsistentLabels } else { Outcome::TooFewViews };
+            let missed = all + self.dissenters.len() >= self.min_views;
+            return if missed && !self.dissenters.is_empty() {
+                Outcome::InconsistentLabels
+            } else {
+                Outcome::TooFewViews
+            };
         }
         if policy.consistency() == Consistency::Strict && !self.dissenters.is_empty() {
             return Outcome::InconsistentLabels;

@@ -25,7 +25,7 @@ mod working_set;
 
 pub use maps::{FusionMaps, MapSource};
 pub use normals::WithNormals;
-pub use options::{AttributeSource, FusionOptions};
+pub use options::{AttributeSource, FusionOptions, Support};
 pub use plan::{FusionView, MapInfo};
 pub use smoothed::WithSmoothLabels;
 pub use stream::{FusionInput, fuse};

@@ -23,6 +23,18 @@ impl AttributeSource {
     }
 }
 
+/// Which depths of other views count towards a point's views.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Support {
+    /// Only those that no other point has claimed, as in OpenMVS: every depth is part of one point at most.
+    #[default]
+    Unclaimed,
+    /// Claimed ones, too: a depth starts one point or is claimed by one, and supports all others that agree with it.
+    /// A point that needs claimed depths needs one view more. Views rarely sample a surface alike, so that claims
+    /// alone leave every other depth without enough views.
+    All,
+}
+
 /// How depth maps become one cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FusionOptions {
@@ -33,6 +45,8 @@ pub struct FusionOptions {
     pub depth_diff_threshold: f32,
     /// "Normal Diff Threshold": largest angle between the normals of merged pixels, degrees, 0..180. Default 25.
     pub normal_diff_threshold_deg: f32,
+    /// `--support`. Default: unclaimed depths.
+    pub support: Support,
     /// `--estimate-colors`. Default: during fusion.
     pub estimate_colors: AttributeSource,
     /// `--estimate-normals`. Default: during fusion.
@@ -48,6 +62,7 @@ impl Default for FusionOptions {
             number_views_fuse: 3,
             depth_diff_threshold: 0.01,
             normal_diff_threshold_deg: 25.0,
+            support: Support::Unclaimed,
             estimate_colors: AttributeSource::DuringFusion,
             estimate_normals: AttributeSource::DuringFusion,
             map_memory: 256 << 20,
@@ -56,6 +71,18 @@ impl Default for FusionOptions {
 }
 
 impl FusionOptions {
+    /// Options for [`Support::All`]: depths are the same within 0.007, and normals only have to face the same side. A
+    /// depth that is left over finds support anyway, so that pairs can be held to a closer match; normals of weakly
+    /// textured surfaces scatter more than their depths, and the two sides of a thin wall differ by more than 90°.
+    pub fn supporting() -> Self {
+        FusionOptions {
+            support: Support::All,
+            depth_diff_threshold: 0.007,
+            normal_diff_threshold_deg: 90.0,
+            ..FusionOptions::default()
+        }
+    }
+
     /// Refuses thresholds that no pair of pixels could meet.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use super::correspond::{Matching, RowMatches, RowScratch};
 use super::merge::{Merger, RowClaims};
 use super::options::AttributeSource;
 use super::participant::Participant;
-use super::state::FreePixels;
+use super::state::PixelStates;
 use super::summary::Tally;
 use crate::error::Result;
 use crate::scene::{CloudLayout, PointCloud, PointSink, PointSource};
@@ -41,8 +41,8 @@ pub(super) struct Pipe<'a> {
     pub(super) layout: CloudLayout,
     /// The bands under way, by number modulo [`PASSES`].
     bands: [Band; PASSES],
-    /// What was free when the turn began.
-    before: Vec<FreePixels>,
+    /// The states when the turn began.
+    before: Vec<PixelStates>,
 }
 
 impl<'a> Pipe<'a> {
@@ -55,7 +55,7 @@ impl<'a> Pipe<'a> {
         Pipe { matching, merger, colors, layout, bands: Default::default(), before: Vec::new() }
     }
 
-    /// Makes points of the free pixels of the first of `views` and the matching ones of the others. `free` is parallel
+    /// Makes points of the free pixels of the first of `views` and the matching ones of the others. `states` are parallel
     /// to `views`; so are the counts of invalidated pixels that `tally` has afterwards.
     ///
     /// # Errors
@@ -63,19 +63,19 @@ impl<'a> Pipe<'a> {
     pub(super) fn take_turn(
         &mut self,
         views: &[Participant<'_>],
-        free: &mut [FreePixels],
+        states: &mut [PixelStates],
         tally: &mut Tally,
         sink: &mut dyn PointSink,
     ) -> Result<()> {
         let Some(reference) = views.first() else { return Ok(()) };
-        self.before.resize_with(free.len(), FreePixels::default);
-        self.before.iter_mut().zip(&*free).for_each(|(before, free)| before.copy(free));
+        self.before.resize_with(states.len(), PixelStates::default);
+        self.before.iter_mut().zip(&*states).for_each(|(before, states)| before.copy(states));
         let (width, height) = (reference.width as usize, reference.height as usize);
         let threads = rayon::current_num_threads();
         let rows = (threads * BAND_PIXELS / width.max(1)).max(threads).min(height.max(1));
         let count = height.div_ceil(rows);
         for tick in 0..count + PASSES - 1 {
-            self.tick(tick, count, rows, views, free, tally, sink)?;
+            self.tick(tick, count, rows, views, states, tally, sink)?;
         }
         Ok(())
     }
@@ -88,7 +88,7 @@ impl<'a> Pipe<'a> {
         count: usize,
         rows: usize,
         views: &[Participant<'_>],
-        free: &mut [FreePixels],
+        states: &mut [PixelStates],
         tally: &mut Tally,
         sink: &mut dyn PointSink,
     ) -> Result<()> {
@@ -112,7 +112,7 @@ impl<'a> Pipe<'a> {
             }
             if is_on(1) {
                 for row in claimed.iter_mut() {
-                    merger.merge_row(views, row.y, &row.matches, free, &mut row.claims, tally);
+                    merger.merge_row(views, row.y, &row.matches, states, &mut row.claims, tally);
                 }
             }
             if is_on(3) {
@@ -128,9 +128,9 @@ fn start_band(band: &mut Band, top: usize, rows: usize, height: usize) {
     band.iter_mut().zip(top as u32..).for_each(|(row, y)| row.y = y);
 }
 
-fn match_band(band: &mut Band, views: &[Participant<'_>], free: &[FreePixels], matching: &Matching<'_>) {
+fn match_band(band: &mut Band, views: &[Participant<'_>], states: &[PixelStates], matching: &Matching<'_>) {
     band.par_iter_mut().for_each_init(RowScratch::default, |scratch, row| {
-        row.matches.compute(scratch, views, free, row.y, matching);
+        row.matches.compute(scratch, views, states, row.y, matching);
     });
 }
 

@@ -5,7 +5,7 @@ use super::merge::Merger;
 use super::participant::Participant;
 use super::pipe::Pipe;
 use super::plan::FusionPlan;
-use super::state::FreePixels;
+use super::state::PixelStates;
 use super::summary::{FusionSummary, Tally};
 use super::unfused::project_maps;
 use super::working_set::{WorkingSet, load_checked};
@@ -108,7 +108,7 @@ fn fuse_by_turns(
     };
     let merger = Merger::new(min_views, input.policy);
     let mut pipe = Pipe::new(matching, merger, options.estimate_colors, input.layout(options));
-    let mut maps = WorkingSet::new(input, plan, options.map_memory);
+    let mut maps = WorkingSet::new(input, plan, options);
     let mut depths = 0;
     for (i, step) in plan.steps.iter().enumerate() {
         progress.check()?;
@@ -119,21 +119,21 @@ fn fuse_by_turns(
         depths +=
             count_pixels(reference.pixels.iter().map(|p| p.depth), reference.labels(), input.policy, tally);
         depths -= maps.invalidated(step.view);
-        let mut free = views.iter().map(|&v| maps.take_free(v)).collect::<Vec<_>>();
+        let mut states = views.iter().map(|&v| maps.take_states(v)).collect::<Vec<_>>();
         tally.invalidated.clear();
         tally.invalidated.resize(views.len(), 0);
         let participants =
             views.iter().map(|&v| Ok(Participant::new(v, maps.maps(v)?))).collect::<Result<Vec<_>>>()?;
-        count_rejected(&participants, &free, input.policy, tally);
+        count_rejected(&participants, &states, input.policy, tally);
         let mut turn = Ok(());
         let mut next = Vec::new();
         rayon::in_place_scope(|scope| {
             scope.spawn(|_| next = maps.load_ahead(i + 1));
-            turn = pipe.take_turn(&participants, &mut free, tally, sink);
+            turn = pipe.take_turn(&participants, &mut states, tally, sink);
         });
         turn?;
-        for ((&view, free), &invalidated) in views.iter().zip(free).zip(&tally.invalidated) {
-            maps.restore(view, free);
+        for ((&view, states), &invalidated) in views.iter().zip(states).zip(&tally.invalidated) {
+            maps.restore(view, states);
             maps.add_invalidated(view, invalidated);
         }
         maps.finish(i);
@@ -146,12 +146,12 @@ fn fuse_by_turns(
 /// Counts the free pixels of the first view that start no point because of their class.
 fn count_rejected(
     views: &[Participant<'_>],
-    free: &[FreePixels],
+    states: &[PixelStates],
     policy: Option<&ClassPolicy>,
     tally: &mut Tally,
 ) {
     let Some(policy) = policy.filter(|policy| !policy.keeps_everything()) else { return };
-    for pixel in free[0].in_range(0, views[0].pixels.len()) {
+    for pixel in states[0].free_in_range(0, views[0].pixels.len()) {
         let label = views[0].label(pixel);
         if !policy.is_candidate(label) {
             tally.class(label).rejected_by_class += 1;

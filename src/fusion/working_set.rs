@@ -3,8 +3,8 @@
 
 use super::participant::ViewPixels;
 use super::plan::FusionPlan;
-use super::state::FreePixels;
-use super::{FusionInput, FusionMaps, FusionView, MapSource};
+use super::state::PixelStates;
+use super::{FusionInput, FusionMaps, FusionOptions, FusionView, MapSource, Support};
 use crate::error::{Error, Result};
 use crate::scene::ViewIndex;
 use rayon::prelude::*;
@@ -18,8 +18,9 @@ pub(super) struct WorkingSet<'a> {
     plan: &'a FusionPlan,
     source: &'a dyn MapSource,
     memory: u64,
+    support: Support,
     maps: Vec<Option<ViewPixels>>,
-    free: Vec<Option<FreePixels>>,
+    states: Vec<Option<PixelStates>>,
     /// Free pixels that were invalidated before their view's own step.
     invalidated: Vec<u64>,
 }
@@ -28,16 +29,17 @@ pub(super) struct WorkingSet<'a> {
 pub(super) type Loaded = (ViewIndex, Result<ViewPixels>);
 
 impl<'a> WorkingSet<'a> {
-    /// An empty set that keeps maps of up to `memory` bytes beyond those of a step.
-    pub(super) fn new(input: &FusionInput<'a>, plan: &'a FusionPlan, memory: u64) -> Self {
+    /// An empty set that keeps maps of up to `options.map_memory` bytes beyond those of a step.
+    pub(super) fn new(input: &FusionInput<'a>, plan: &'a FusionPlan, options: &FusionOptions) -> Self {
         let views = input.views;
         WorkingSet {
             views,
             plan,
             source: input.source,
-            memory,
+            memory: options.map_memory,
+            support: options.support,
             maps: views.iter().map(|_| None).collect(),
-            free: vec![None; views.len()],
+            states: vec![None; views.len()],
             invalidated: vec![0; views.len()],
         }
     }
@@ -63,9 +65,10 @@ impl<'a> WorkingSet<'a> {
     pub(super) fn insert(&mut self, loaded: Vec<Loaded>) -> Result<()> {
         for (view, maps) in loaded {
             let maps = maps?;
-            let free = &mut self.free[view.index()];
-            if free.is_none() {
-                *free = Some(FreePixels::with_depth(maps.pixels.iter().map(|pixel| pixel.depth)));
+            let states = &mut self.states[view.index()];
+            if states.is_none() {
+                let depths = maps.pixels.iter().map(|pixel| pixel.depth);
+                *states = Some(PixelStates::with_depth(depths, self.support));
             }
             self.maps[view.index()] = Some(maps);
         }
@@ -90,7 +93,7 @@ impl<'a> WorkingSet<'a> {
         for view in self.plan.steps[step].views() {
             if self.plan.next_use(view, step + 1).is_none() {
                 self.maps[view.index()] = None;
-                self.free[view.index()] = None;
+                self.states[view.index()] = None;
             }
         }
     }
@@ -103,12 +106,12 @@ impl<'a> WorkingSet<'a> {
     }
 
     /// Takes the pixel state of a view out of the set; [`WorkingSet::restore`] it before the step ends.
-    pub(super) fn take_free(&mut self, view: ViewIndex) -> FreePixels {
-        self.free[view.index()].take().unwrap_or_default()
+    pub(super) fn take_states(&mut self, view: ViewIndex) -> PixelStates {
+        self.states[view.index()].take().unwrap_or_default()
     }
 
-    pub(super) fn restore(&mut self, view: ViewIndex, free: FreePixels) {
-        self.free[view.index()] = Some(free);
+    pub(super) fn restore(&mut self, view: ViewIndex, states: PixelStates) {
+        self.states[view.index()] = Some(states);
     }
 
     pub(super) fn add_invalidated(&mut self, view: ViewIndex, pixels: u64) {

@@ -1,10 +1,9 @@
 //! Everything from the scene to the cloud, as the program does it.
 
-use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::FusionOptions;
 use crate::pipeline::{
-    self, AcrossViews, DensifyJob, FilterJob, LabelJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork,
+    self, DensifyJob, FilterJob, LabelJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork,
 };
 use crate::progress::{Event, Listener, Progress, Stage};
 use crate::report::RunReport;
@@ -199,7 +198,7 @@ impl Densify {
         let labels = self.labels();
         let compared = labels.as_ref().is_some_and(|labels| labels.rules.consistency != Consistency::Off);
         let fewest = if compared { 2 } else { FusionOptions::default().number_views_fuse };
-        let across = AcrossViews::Unbiased(UnbiasedFilterOptions::default());
+        let labelled = labels.is_some();
         Ok(DensifyJob {
             input: self.input(labels),
             resolution: self.resolution,
@@ -207,17 +206,12 @@ impl Densify {
             force: false,
             pictures: false,
             stereo: StereoOptions::of(self.quality),
-            filter: FilterJob {
-                speckles: true,
-                gaps: true,
-                across: Some(across),
-                options: DepthFilterOptions::default(),
-            },
+            filter: FilterJob::unbiased(labelled),
             depth_maps_only: false,
             remove_depth_maps: false,
             fusion: FusionOptions {
                 number_views_fuse: self.min_views.unwrap_or(fewest),
-                ..FusionOptions::default()
+                ..FusionOptions::supporting()
             },
             outputs: Outputs { scene: Some(cloud.with_extension("mvs")), ..Outputs::of(cloud.clone()) },
         })

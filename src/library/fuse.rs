@@ -22,7 +22,7 @@ pub struct FuseView {
 }
 
 /// How [`fuse`] works. Every setter takes the options and gives them back.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct FuseOptions {
     fusion: FusionOptions,
     classes: Option<ClassTable>,
@@ -61,10 +61,16 @@ impl FuseView {
     }
 }
 
+impl Default for FuseOptions {
+    fn default() -> Self {
+        FuseOptions::new()
+    }
+}
+
 impl FuseOptions {
     /// The defaults.
     pub fn new() -> Self {
-        FuseOptions::default()
+        FuseOptions { fusion: FusionOptions::supporting(), classes: None, rules: ClassRules::default() }
     }
 
     /// Fewest views that must agree on a point, no more than there are; below 2 every depth becomes a point. Default: 3.
@@ -73,13 +79,13 @@ impl FuseOptions {
         self
     }
 
-    /// Relative difference below which two depths are the same. Default: 0.01.
+    /// Relative difference below which two depths are the same. Default: 0.007.
     pub fn depth_tolerance(mut self, relative: f32) -> Self {
         self.fusion.depth_diff_threshold = relative;
         self
     }
 
-    /// Largest angle between the normals of pixels that become one point, degrees. Default: 25.
+    /// Largest angle between the normals of pixels that become one point, degrees. Default: 90.
     pub fn normal_tolerance_deg(mut self, degrees: f32) -> Self {
         self.fusion.normal_diff_threshold_deg = degrees;
         self

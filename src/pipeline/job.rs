@@ -126,6 +126,10 @@ pub struct DensifyJob {
     pub outputs: Outputs,
 }
 
+/// "Depth Diff Threshold" that holds regions together before the unbiased filter: lower than OpenMVS's, so that scraps
+/// do not hang on to what they lie beside.
+const SCRAP_DEPTH_DIFF: f32 = 0.006;
+
 /// Which filters run on the depth maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterJob {
@@ -149,6 +153,30 @@ pub enum AcrossViews {
 }
 
 impl FilterJob {
+    /// What the unbiased filter goes with: itself alone, as it leaves few speckles and small regions that other views
+    /// confirm are worth keeping. `cut_out`: labels or masks leave pixels out, and scraps beside those are removed, too.
+    pub fn unbiased(cut_out: bool) -> Self {
+        FilterJob {
+            speckles: cut_out,
+            gaps: false,
+            across: Some(AcrossViews::Unbiased(UnbiasedFilterOptions::default())),
+            options: DepthFilterOptions {
+                depth_diff_threshold: SCRAP_DEPTH_DIFF,
+                ..DepthFilterOptions::default()
+            },
+        }
+    }
+
+    /// What OpenMVS does: everything.
+    pub fn openmvs() -> Self {
+        FilterJob {
+            speckles: true,
+            gaps: true,
+            across: Some(AcrossViews::OpenMvs),
+            options: DepthFilterOptions::default(),
+        }
+    }
+
     /// The filters of OpenMVS's `--postprocess-dmaps`, of which bit 2 stands for `across`.
     ///
     /// # Errors
@@ -165,6 +193,12 @@ impl FilterJob {
             across: (bits & 4 != 0).then_some(across),
             options,
         })
+    }
+
+    /// The bits of [`FilterJob::from_bits`].
+    pub fn bits(&self) -> u32 {
+        let bits = [self.speckles, self.gaps, self.across.is_some()];
+        bits.iter().enumerate().map(|(i, &on)| u32::from(on) << i).sum()
     }
 }
 

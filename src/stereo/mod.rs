@@ -12,6 +12,7 @@ mod options;
 mod plane;
 mod plane_fit;
 mod problem;
+mod proposals;
 mod region_planes;
 mod rng;
 mod solver;
@@ -33,6 +34,7 @@ use crate::{Error, Result};
 use cost::Kernels;
 use level::{Level, MAX_SIDE, Weighting};
 use plane::Pinhole;
+use proposals::Proposals;
 use region_planes::draw_to_planes;
 use solver::{Pass, Solver, Start};
 use state::State;
@@ -68,7 +70,7 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
             None => State::random(&level, problem, view, options.seed),
             Some(coarse) => State::refined(&level, coarse, problem.skip.as_ref()),
         };
-        let mut solver = Solver::new(kernels, &level, options.seed, view);
+        let mut solver = Solver::new(kernels, &level, options.seed, view, None);
         let spared = u32::from(halvings == 0 && coarsest > 0);
         for i in 0..options.iterations.saturating_sub(spared).max(1) {
             let start = match (i, halvings == coarsest) {
@@ -143,7 +145,10 @@ pub fn refine_geometric(
         (depth > 0.0).then(|| (pinhole.plane(x as f32, y as f32, depth, normal), cost))
     });
     let kernels = Kernels::of(cpu);
-    let mut solver = Solver::new(kernels, &level, options.seed, problem.reference.id.0);
+    let maps = sources.iter().filter_map(|s| s.as_deref());
+    let proposals = Proposals::new(&level, &state, &problem.reference.camera, maps);
+    let view = problem.reference.id.0;
+    let mut solver = Solver::new(kernels, &level, options.seed, view, Some(&proposals));
     solver.pass(
         &mut state,
         Pass {

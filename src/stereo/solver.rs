@@ -4,6 +4,7 @@ use super::candidates::{self, CELLS};
 use super::cost::Kernels;
 use super::level::Level;
 use super::plane::InversePlane;
+use super::proposals::{Proposals, Proposed};
 use super::rng::Rng;
 use super::state::State;
 use super::tile::{CENTRE, TILE_H, TILE_W, Tile};
@@ -12,8 +13,12 @@ use super::tile::{CENTRE, TILE_H, TILE_W, Tile};
 const SAME_PLANE: f32 = 0.03;
 /// The same for planes from beside the tile: they are to bring other surfaces, details are refined anyway.
 const SAME_SURFACE: f32 = 0.5;
+/// The same for planes that other views propose.
+const SAME_PROPOSAL: f32 = 0.25;
 /// Shift of the tile grid in successive passes.
 const SHIFTS: [(i32, i32); 4] = [(0, 0), (-8, -4), (-4, -2), (-12, -6)];
+/// Planes tried that the sources' depth maps propose for a tile.
+const PROPOSALS: usize = 6;
 /// Mean cost above which a tile is tried with random planes.
 const BAD_TILE: f32 = 0.5;
 
@@ -62,18 +67,30 @@ pub(crate) struct Solver<'a> {
     pub(crate) level: &'a Level,
     pub(crate) seed: u64,
     pub(crate) view: u32,
+    proposals: Option<&'a Proposals>,
+    /// Those on the tile.
+    proposed: Vec<Proposed>,
     tile: Box<Tile>,
     /// Planes tried at this visit, at the tile's corners, and the class they were tried on.
     tried: Vec<([f32; 4], u32)>,
 }
 
 impl<'a> Solver<'a> {
-    pub(crate) fn new(kernels: Kernels, level: &'a Level, seed: u64, view: u32) -> Self {
+    /// `proposals`: what other views see, if they have been estimated.
+    pub(crate) fn new(
+        kernels: Kernels,
+        level: &'a Level,
+        seed: u64,
+        view: u32,
+        proposals: Option<&'a Proposals>,
+    ) -> Self {
         Solver {
             kernels,
             level,
             seed,
             view,
+            proposals,
+            proposed: Vec::new(),
             tile: Tile::boxed(level.sources.len()),
             tried: Vec::with_capacity(64),
         }
@@ -108,6 +125,7 @@ impl<'a> Solver<'a> {
                 self.offer(p, class, SAME_SURFACE);
             }
         }
+        self.try_proposals();
         let cost = self.mean_cost();
         let bad = if cost > BAD_TILE { pass.random_if_bad } else { 0 };
         for _ in 0..pass.random + bad {
@@ -161,6 +179,17 @@ impl<'a> Solver<'a> {
             }
         }
         self.tile.views = pass.views.min(all);
+    }
+
+    /// Tries what the sources' depth maps propose here.
+    fn try_proposals(&mut self) {
+        let Some(proposals) = self.proposals else { return };
+        let mut proposed = std::mem::take(&mut self.proposed);
+        proposals.on(&self.tile, &mut proposed);
+        for &Proposed { plane, class, .. } in proposed.iter().take(PROPOSALS) {
+            self.offer(plane, class, SAME_PROPOSAL);
+        }
+        self.proposed = proposed;
     }
 
     fn shake(&mut self, pass: Pass, first: usize, k: usize, rng: &mut Rng) {

@@ -1,9 +1,12 @@
 //! The depth map of a source view as it is compared with: planes of inverse depth, made once for all views that do.
 
-use super::plane::Pinhole;
+use super::plane::{InversePlane, Pinhole};
 use crate::geometry::{Camera, Size};
 use crate::scene::DepthEstimate;
 use std::sync::Arc;
+
+/// Confidence from which on an estimate is proposed to other views.
+const SURE: f32 = 0.05;
 
 /// The depth map of a source view as a plane of inverse depth per pixel.
 #[derive(Clone, Debug)]
@@ -11,7 +14,7 @@ pub struct SourcePlanes {
     pub(crate) size: Size,
     /// Camera at that size.
     pub(crate) camera: Camera,
-    /// Two words a pixel: the bits of its inverse depth (0 = none), and the upper halves of the bits of its change
+    /// Two words a pixel: the bits of its inverse depth (0 = none), the last of which says whether it is trusted, and the upper halves of the bits of its change
     /// per column (low half) and per row (high half).
     pub(crate) planes: Arc<[u32]>,
 }
@@ -30,11 +33,23 @@ impl SourcePlanes {
             for ((x, (&depth, &normal)), out) in (0i32..).zip(pixels).zip(out.chunks_exact_mut(2)) {
                 let p = pinhole.plane(x as f32, y as f32, depth, normal);
                 let known = u32::from(depth > 0.0).wrapping_neg();
-                out[0] = p.w.to_bits() & known;
+                let sure = map.confidence.as_ref().is_none_or(|c| c[(x as usize, y)] >= SURE);
+                out[0] = (p.w.to_bits() & !1 | u32::from(sure)) & known;
                 out[1] = (upper_half(p.wx) | upper_half(p.wy) << 16) & known;
             }
         }
         SourcePlanes { size: map.depth.size(), camera: map.camera.clone(), planes: planes.into() }
+    }
+
+    /// The plane of a pixel, anchored there, if the map has one that is good enough to propose to others.
+    pub(crate) fn trusted(&self, x: usize, y: usize) -> Option<InversePlane> {
+        let at = 2 * (y * self.size.width as usize + x);
+        let (w, slopes) = (self.planes[at], self.planes[at + 1]);
+        (w & 1 != 0).then(|| InversePlane {
+            w: f32::from_bits(w),
+            wx: f32::from_bits(slopes << 16),
+            wy: f32::from_bits(slopes & 0xffff_0000),
+        })
     }
 
     /// Bytes that they take in memory.

@@ -9,6 +9,7 @@ use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::semvs_args::DensifyArgs;
 use crate::error::{Error, Result};
+use crate::fusion::Support;
 use crate::pipeline::{self, DensifyJob, DepthMapsJob};
 use crate::stereo::Quality;
 use crate::store::paths::is_same_file;
@@ -67,7 +68,7 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
         filter: resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?,
         depth_maps_only,
         remove_depth_maps: shared.fusion.remove_dmaps,
-        fusion: resolver.fusion(agreeing_on_class(typed))?,
+        fusion: resolver.fusion(Support::All, agreeing_on_class(typed))?,
         outputs,
     })
 }

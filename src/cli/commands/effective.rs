@@ -1,6 +1,6 @@
 //! Every option in effect, for reports.
 
-use crate::fusion::FusionOptions;
+use crate::fusion::{FusionOptions, Support};
 use crate::pipeline::{AcrossViews, FilterJob, Outputs, SceneJob};
 use crate::semantics::LabelEstimation;
 use crate::store::cloud::PlyLayout;
@@ -53,6 +53,10 @@ pub(crate) fn resolve(
         PlyLayout::OpenMvs | PlyLayout::OpenMvsProject => "openmvs",
         PlyLayout::Odm => "odm",
     };
+    let support = match fusion.support {
+        Support::All => "all",
+        Support::Unclaimed => "unclaimed",
+    };
     let folder =
         if input.working_folder.as_os_str().is_empty() { Path::new(".") } else { &input.working_folder };
     let mut meant = vec![
@@ -60,6 +64,7 @@ pub(crate) fn resolve(
         ("output-file", path(&outputs.cloud)),
         ("working-folder", path(folder)),
         ("ply-layout", layout.into()),
+        ("support", support.into()),
     ];
     meant.extend(depth_maps.map(|folder| ("depth-maps", path(folder))));
     if let Some(labels) = &input.labels {
@@ -73,9 +78,7 @@ pub(crate) fn resolve(
     }
     options.insert("number-views-fuse".to_owned(), fusion.number_views_fuse.into());
     if let Some(filter) = filter {
-        let bits = [filter.speckles, filter.gaps, filter.across.is_some()];
-        let bits = bits.iter().enumerate().map(|(i, &on)| u32::from(on) << i).sum::<u32>();
-        options.insert("postprocess-dmaps".to_owned(), bits.into());
+        options.insert("postprocess-dmaps".to_owned(), filter.bits().into());
         meant.extend(filter.across.map(|across| match across {
             AcrossViews::OpenMvs => ("filter", "openmvs".into()),
             AcrossViews::Unbiased(_) => ("filter", "unbiased".into()),

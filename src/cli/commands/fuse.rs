@@ -8,6 +8,7 @@ use crate::cli::listen::Recorder;
 use crate::cli::resolve::Resolver;
 use crate::cli::semvs_args::FuseArgs;
 use crate::error::Result;
+use crate::fusion::Support;
 use crate::pipeline::{self, DepthMapsJob, FuseJob};
 use crate::store::colmap::Pass;
 use clap::ArgMatches;
@@ -44,7 +45,7 @@ fn job(args: &FuseArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Result<F
             .then(|| resolver.resolution())
             .transpose()?,
         depth_maps: depth_maps(args),
-        fusion: resolver.fusion(agreeing_on_class(typed))?,
+        fusion: resolver.fusion(Support::All, agreeing_on_class(typed))?,
         outputs,
     })
 }

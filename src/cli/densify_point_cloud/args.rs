@@ -157,6 +157,7 @@ pub(crate) const BEYOND: &[&str] = &[
     "offset",
     "las-normals",
     "filter",
+    "support",
     "quality",
     "max-memory",
     "strict",

@@ -165,6 +165,7 @@ mod tests {
                     "missing-labels" | "unknown-label" => "void".into(),
                     "ply-layout" => "plain".into(),
                     "filter" => "unbiased".into(),
+                    "support" => "all".into(),
                     "quality" => "draft".into(),
                     "label-votes" => "merged".into(),
                     "label-filter" => "on".into(),

@@ -13,6 +13,7 @@ use crate::cli::options::FilterKind;
 use crate::cli::resolve::{self, Resolver};
 use crate::cli::values::{openmvs_path, under};
 use crate::error::{Error, Result};
+use crate::fusion::Support;
 use crate::pipeline::{self, DensifyJob, Outputs, SceneArchive};
 use crate::report::{RunReport, build, class_table};
 use crate::stereo::Quality;
@@ -178,7 +179,7 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         filter: resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
         depth_maps_only: shared.estimation.fusion_mode == 1,
         remove_depth_maps: shared.fusion.remove_dmaps,
-        fusion: resolver.fusion(None)?,
+        fusion: resolver.fusion(Support::Unclaimed, None)?,
         outputs: Outputs {
             scene: Some(with_suffix(&base, ".mvs")),
             archive,
