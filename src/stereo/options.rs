@@ -36,7 +36,8 @@ pub struct StereoOptions {
     pub iterations: u32,
     /// Passes that also compare a hypothesis with the neighbours' depth maps. 0..=100. Default: 2.
     pub geometric_iterations: u32,
-    /// Planes from within a tile, and as many from beside it, that its pixels try at a visit. 1..=64. Default: 6.
+    /// Planes from within a tile, and as many from beside it, that its pixels try at a visit; two thirds of that in
+    /// passes with the neighbours' depth maps, which propose planes themselves. 1..=64. Default: 6.
     pub candidates: u32,
     /// Small changes of a tile's planes, and as many planes fitted to its pixels, tried at a visit. 0..=64. Default: 4.
     pub refinements: u32,

@@ -1,7 +1,5 @@
 //! Hypotheses as planes of inverse depth over the pixel grid.
 
-use nalgebra::Vector3;
-
 /// A local plane: inverse depth at a pixel and its change per pixel. Exact under perspective, because the
 /// inverse depth of a plane is affine in pixel coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,11 +37,12 @@ impl Pinhole {
     }
 
     /// Unit normal facing the camera of the plane anchored at pixel `(x, y)`.
+    #[inline]
     pub(crate) fn normal(&self, p: InversePlane, x: f32, y: f32) -> [f32; 3] {
         let m = self.plane_vector(p, x, y).map(f64::from);
-        let n = -Vector3::from(m);
-        let n = n / n.norm().max(f64::MIN_POSITIVE);
-        [n.x as f32, n.y as f32, n.z as f32]
+        let length = (m[0] * m[0] + m[1] * m[1] + m[2] * m[2]).sqrt();
+        let r = -1.0 / length.max(f64::MIN_POSITIVE);
+        m.map(|v| (v * r) as f32)
     }
 
     /// The plane through depth `depth` at pixel `(x, y)` with unit normal `n`. A normal that is zero or does not
