@@ -20,6 +20,7 @@ mod options;
 mod options_page_tests;
 mod page_args;
 mod resolve;
+mod resolve_labels;
 mod semvs;
 mod semvs_args;
 mod values;

@@ -90,7 +90,7 @@ pub(crate) struct EstimationOptions {
 #[command(next_help_heading = "Filtering and fusion")]
 pub(crate) struct FusionOptions {
     /// Filters on the depth maps, a sum of: 1 = remove speckles, 2 = fill gaps, 4 = filter across views [default: 4
-    /// with the unbiased filter, 5 if there are labels or masks, 7 with OpenMVS's]
+    /// with the unbiased filter, 7 with OpenMVS's]
     #[arg(long, value_name = "BITS")]
     pub(crate) postprocess_dmaps: Option<u32>,
     /// The filter across views [default: unbiased in semvs, openmvs in DensifyPointCloud]

@@ -1,22 +1,18 @@
 //! From options as typed to jobs whose values are checked.
 
 use super::dense_config::{self, DenseConfig};
-use super::label_options::{
-    CloudForms, ConsistencyMode, EstimationMode, LabelInput, OnOff, PlyLayout as TypedLayout, VotersMode,
-    WhenMissing,
-};
+use super::label_options::{CloudForms, PlyLayout as TypedLayout};
 use super::options::{FilterKind, SharedOptions};
+use super::resolve_labels::has_labels;
+pub(crate) use super::resolve_labels::{labels, missing, rules, table, unknown};
 use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::{AttributeSource, FusionOptions, Support};
-use crate::pipeline::{
-    AcrossViews, FilterJob, LabelJob, MaskJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork,
-};
+use crate::pipeline::{AcrossViews, FilterJob, MaskJob, Outputs, RoiJob, SceneJob, TowerJob, TowerWork};
 use crate::scene::{NeighborOptions, OutsideRoi, PairingOptions, ResolutionOptions, RoiEstimation};
-use crate::semantics::{ClassRules, Consistency, LabelEstimation, Voters};
+use crate::semantics::Consistency;
 use crate::stereo::{CpuLevel, Quality, StereoOptions};
 use crate::store::cloud::PlyLayout;
-use crate::store::labels::{LabelSources, MissingLabels, UnknownLabel};
 use std::path::{Path, PathBuf};
 
 /// What the options say, paths resolved by `place`.
@@ -158,20 +154,13 @@ impl<'a> Resolver<'a> {
         let config = &self.config;
         let own = match self.options.fusion.filter.unwrap_or(default) {
             FilterKind::Openmvs => FilterJob::openmvs(),
-            FilterKind::Unbiased => {
-                let masked = self.options.images.ignore_mask_label >= 0;
-                FilterJob::unbiased(masked || has_labels(&self.options.labels.input))
-            }
+            FilterKind::Unbiased => FilterJob::unbiased(),
         };
         let typed = self.options.fusion.postprocess_dmaps.unwrap_or(own.bits());
-        let bits = config.optimize.filter(|_| !bits_are_typed).unwrap_or(typed);
-        let openmvs = DenseConfig::default();
+        let is_own = |bits: &u32| *bits != FilterJob::openmvs().bits() || own.bits() == *bits;
+        let bits = config.optimize.filter(|_| !bits_are_typed).filter(is_own).unwrap_or(typed);
         let options = DepthFilterOptions {
-            depth_diff_threshold: asked(
-                config.depth_diff_threshold,
-                openmvs.depth_diff_threshold,
-                own.options.depth_diff_threshold,
-            ),
+            depth_diff_threshold: config.depth_diff_threshold,
             speckle_size: config.speckle_size,
             interpolate_gap_size: config.interpolate_gap_size,
             min_views_filter: config.min_views_filter,
@@ -261,114 +250,6 @@ pub(crate) fn masks(ignore: i32, folder: Option<PathBuf>) -> Result<Option<MaskJ
     let ignore = u16::try_from(ignore)
         .map_err(|_| Error::invalid(format!("--ignore-mask-label {ignore}: mask values are 0 to 65535")))?;
     Ok(Some(MaskJob { ignore, folder }))
-}
-
-/// What the options ask to do with classes.
-pub(crate) fn rules(typed: &LabelInput) -> ClassRules {
-    let names = |list: &[String]| {
-        list.iter().map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect::<Vec<String>>()
-    };
-    ClassRules {
-        classes: names(&typed.classes),
-        exclude: names(&typed.exclude_classes),
-        estimation: match typed.label_estimation {
-            Some(EstimationMode::Off) => LabelEstimation::Off,
-            Some(EstimationMode::Skip) | None => LabelEstimation::Skip,
-            Some(EstimationMode::Aware) => {
-                LabelEstimation::Aware { cost: typed.label_cost.unwrap_or(LabelEstimation::DEFAULT_COST) }
-            }
-        },
-        consistency: match typed.label_consistency {
-            Some(ConsistencyMode::Off) => Consistency::Off,
-            Some(ConsistencyMode::Strict) => Consistency::Strict,
-            Some(ConsistencyMode::Support) | None => Consistency::Support,
-        },
-        border: typed.label_border,
-        voters: match typed.label_votes {
-            Some(VotersMode::Merged) => Voters::Merged,
-            Some(VotersMode::All) | None => Voters::All,
-        },
-        smooth: typed.label_smooth,
-        filter: match typed.label_filter {
-            Some(filter) => filter == OnOff::On,
-            None => typed.label_estimation == Some(EstimationMode::Aware),
-        },
-    }
-}
-
-/// Whether labels take part.
-fn has_labels(typed: &LabelInput) -> bool {
-    typed.label_path.is_some() || typed.class_table.is_some()
-}
-
-/// The labels that the options ask for.
-///
-/// # Errors
-/// Options about classes without labels.
-pub(crate) fn labels(typed: &LabelInput, place: &dyn Fn(&Path) -> PathBuf) -> Result<Option<LabelJob>> {
-    let sources = LabelSources {
-        label_path: typed.label_path.as_deref().map(place),
-        class_table: typed.class_table.as_deref().map(|name| table(name, place)),
-        unknown: unknown(typed.unknown_label),
-        missing: missing(typed.missing_labels),
-    };
-    if let Some(cost) = typed.label_cost {
-        if !(0.0..=2.0).contains(&cost) {
-            return Err(Error::invalid(format!("--label-cost {cost}: give a cost of 0 to 2")));
-        }
-        if has_labels(typed) && typed.label_estimation != Some(EstimationMode::Aware) {
-            return Err(Error::invalid("--label-cost needs --label-estimation aware"));
-        }
-    }
-    let rules = rules(typed);
-    if has_labels(typed) {
-        return Ok(Some(LabelJob { sources, rules }));
-    }
-    let asked = [
-        (!rules.classes.is_empty(), "--classes"),
-        (!rules.exclude.is_empty(), "--exclude-classes"),
-        (typed.label_consistency.is_some(), "--label-consistency"),
-        (typed.label_border > 0, "--label-border"),
-        (typed.label_votes.is_some(), "--label-votes"),
-        (typed.label_smooth > 0, "--label-smooth"),
-        (typed.label_filter == Some(OnOff::On), "--label-filter"),
-        (typed.label_estimation.is_some(), "--label-estimation"),
-        (typed.label_cost.is_some(), "--label-cost"),
-    ];
-    match asked.iter().find(|(asked, _)| *asked) {
-        Some((_, option)) => Err(Error::invalid(format!("{option} needs labels: {NEEDED}"))),
-        None => Ok(None),
-    }
-}
-
-/// `--unknown-label`.
-pub(crate) fn unknown(typed: WhenMissing) -> UnknownLabel {
-    match typed {
-        WhenMissing::Error => UnknownLabel::Refuse,
-        WhenMissing::Void => UnknownLabel::Void,
-    }
-}
-
-/// `--missing-labels`.
-pub(crate) fn missing(typed: WhenMissing) -> MissingLabels {
-    match typed {
-        WhenMissing::Error => MissingLabels::Refuse,
-        WhenMissing::Void => MissingLabels::Void,
-    }
-}
-
-/// How to give labels.
-const NEEDED: &str =
-    "give --label-path, the folder of the label maps, and --class-table unless they hold plain ids";
-
-/// A class table as typed: a file if there is one of that name, else the name of a built-in table.
-pub(crate) fn table(name: &str, place: &dyn Fn(&Path) -> PathBuf) -> String {
-    let path = place(Path::new(name));
-    let is_builtin = crate::semantics::ClassTable::builtin_names().any(|builtin| builtin == name);
-    match path.to_str() {
-        Some(path) if !is_builtin && Path::new(path).is_file() => path.to_owned(),
-        _ => name.to_owned(),
-    }
 }
 
 /// The outputs of a run that writes `cloud` alone, in the forms that are typed, with `layout` where none is.

@@ -93,6 +93,16 @@ fn depths_that_nobody_sees_well_go() {
     views[3].depth.data_mut().iter_mut().for_each(|d| *d *= 0.5);
     assert_eq!(filter(&views, &least(0.99)).depth[CENTRE], 0.0);
     assert!(filter(&views, &least(0.74)).depth[CENTRE] > 0.0);
+    // and who contradicts asks for as much again
+    views[3].depth.data_mut().iter_mut().for_each(|d| *d *= 3.0);
+    let seen_through = |e: f32| UnbiasedFilterOptions { contradictions_per_confirmation: 1.0, ..least(e) };
+    assert_eq!(filter(&views, &seen_through(0.38)).depth[CENTRE], 0.0);
+    assert!(filter(&views, &seen_through(0.37)).depth[CENTRE] > 0.0);
+    // whoever confirms it, a depth must be good for something itself
+    let own = |c: f32| UnbiasedFilterOptions { min_confidence: c, ..seen_through(0.37) };
+    assert!(filter(&views, &own(0.25)).depth[CENTRE] > 0.0);
+    assert_eq!(filter(&views, &own(0.26)).depth[CENTRE], 0.0);
+    assert!(own(1.5).check().is_err() && own(-0.1).check().is_err() && own(0.0).check().is_ok());
     // without confidences there is nothing to add up
     views.iter_mut().for_each(|view| view.confidence = None);
     assert!(filter(&views, &least(0.99)).depth[CENTRE] > 0.0);

@@ -40,6 +40,8 @@ pub(super) struct Merger<'a> {
     claimed: Vec<Member>,
     behind: Vec<Member>,
     dissenters: Vec<Member>,
+    /// How many of those no point has claimed.
+    unclaimed_dissenters: usize,
     vote: Vote,
 }
 
@@ -59,6 +61,7 @@ impl<'a> Merger<'a> {
             claimed: Vec::new(),
             behind: Vec::new(),
             dissenters: Vec::new(),
+            unclaimed_dissenters: 0,
             vote: Vote::default(),
         }
     }
@@ -116,6 +119,7 @@ impl<'a> Merger<'a> {
         self.claimed.clear();
         self.behind.clear();
         self.dissenters.clear();
+        self.unclaimed_dissenters = 0;
         for neighbor in 0..neighbors {
             let Some((relation, pixel)) = row.get(neighbor, i) else { continue };
             let states = &mut states[neighbor + 1];
@@ -131,27 +135,31 @@ impl<'a> Merger<'a> {
                     }
                     out.members.push(member);
                 }
-                Relation::Dissents => self.dissenters.push(member),
+                Relation::Dissents => {
+                    self.unclaimed_dissenters += usize::from(states.is_free(pixel));
+                    self.dissenters.push(member);
+                }
                 Relation::Behind if states.is_free(pixel) => self.behind.push(member),
                 Relation::Behind => {}
             }
         }
     }
 
+    /// Depths that have made a point already are no news: where they are needed, one view more is asked for.
+    fn are_enough(&self, unclaimed: usize, all: usize) -> bool {
+        unclaimed >= self.min_views || all > self.min_views
+    }
+
     fn judge(&mut self, views: &[Participant<'_>], own: u32, members: &[Member]) -> Outcome {
         let (unclaimed, all) = (self.claimed.len() + 1, members.len() + 1);
-        // Depths that have made a point already are no news: where they are needed, one more is asked for.
-        let enough = unclaimed >= self.min_views || all > self.min_views;
+        let enough = self.are_enough(unclaimed, all);
         let Some(policy) = self.policy else {
             return if enough { Outcome::Point(LabelVote::default()) } else { Outcome::TooFewViews };
         };
         if !enough {
-            let missed = all + self.dissenters.len() >= self.min_views;
-            return if missed && !self.dissenters.is_empty() {
-                Outcome::InconsistentLabels
-            } else {
-                Outcome::TooFewViews
-            };
+            let (unclaimed, all) = (unclaimed + self.unclaimed_dissenters, all + self.dissenters.len());
+            let missed = self.are_enough(unclaimed, all);
+            return if missed { Outcome::InconsistentLabels } else { Outcome::TooFewViews };
         }
         if policy.consistency() == Consistency::Strict && !self.dissenters.is_empty() {
             return Outcome::InconsistentLabels;

@@ -1,6 +1,6 @@
 //! Depth maps to points.
 //!
-//! Maps are immutable; what points claim is kept in one bit per pixel beside them, so maps can leave memory and come
+//! Maps are immutable; what points claim is kept in a bit or two per pixel beside them, so maps can leave memory and come
 //! back. A view's turn has three passes over bands of rows: correspondences (parallel), claims (in raster order),
 //! sums (parallel). Only the second depends on order, and it touches bits alone; so the result is the sequential one
 //! for any number of threads, and the passes of successive bands run at the same time.

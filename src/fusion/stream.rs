@@ -44,10 +44,11 @@ impl FusionInput<'_> {
 /// Merges the depth maps of all views into points and sends them to `sink` in their final order.
 ///
 /// Views take turns by decreasing number of neighbours. A pixel that no point has claimed starts a point; a pixel of
-/// a neighbour at its projection joins when depth and normal are similar and, with a policy, the classes agree. With
-/// enough views the point is kept and its pixels are claimed; surfaces of neighbours behind it are discarded.
-/// Position, colour and normal are means weighted by `1 / (max(1 − confidence, 0.03) depth²)`. The result is that of
-/// OpenMVS 2.3.0, point for point; the class check follows Stathopoulou and Remondino 2019, Algorithm 1.
+/// a neighbour at its projection joins when depth and normal are similar and, with a policy, the classes agree; whether
+/// it may be claimed already is up to [`FusionOptions::support`]. With enough views the point is kept and its pixels are
+/// claimed; surfaces of neighbours behind it are discarded. Position, colour and normal are means weighted by
+/// `1 / (max(1 − confidence, 0.03) depth²)`. With the default options the result is that of OpenMVS 2.3.0, point for
+/// point; the class check follows Stathopoulou and Remondino 2019, Algorithm 1.
 ///
 /// # Errors
 /// Those of the source and the sink; maps of different sizes; missing images where colours are wanted.

@@ -198,7 +198,6 @@ impl Densify {
         let labels = self.labels();
         let compared = labels.as_ref().is_some_and(|labels| labels.rules.consistency != Consistency::Off);
         let fewest = if compared { 2 } else { FusionOptions::default().number_views_fuse };
-        let labelled = labels.is_some();
         Ok(DensifyJob {
             input: self.input(labels),
             resolution: self.resolution,
@@ -206,7 +205,7 @@ impl Densify {
             force: false,
             pictures: false,
             stereo: StereoOptions::of(self.quality),
-            filter: FilterJob::unbiased(labelled),
+            filter: FilterJob::unbiased(),
             depth_maps_only: false,
             remove_depth_maps: false,
             fusion: FusionOptions {

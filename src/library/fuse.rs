@@ -3,7 +3,7 @@
 use super::{ClassTable, Cloud, DepthMap, LabelMap};
 use crate::error::{Error, Result};
 use crate::fusion::{
-    self, AttributeSource, FusionInput, FusionMaps, FusionOptions, FusionView, MapInfo, MapSource,
+    self, AttributeSource, FusionInput, FusionMaps, FusionOptions, FusionView, MapInfo, MapSource, Support,
 };
 use crate::geometry::local_origin;
 use crate::progress::Progress;
@@ -76,6 +76,13 @@ impl FuseOptions {
     /// Fewest views that must agree on a point, no more than there are; below 2 every depth becomes a point. Default: 3.
     pub fn min_views(mut self, views: u32) -> Self {
         self.fusion.number_views_fuse = views;
+        self
+    }
+
+    /// Whether depths that are part of a point already support further points. Without it, and with tolerances of 0.01 and
+    /// 25°, fusion is that of OpenMVS. Default: yes.
+    pub fn claimed_depths_support(mut self, yes: bool) -> Self {
+        self.fusion.support = if yes { Support::All } else { Support::Unclaimed };
         self
     }
 

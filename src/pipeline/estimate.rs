@@ -161,6 +161,9 @@ impl Estimation<'_> {
         if last && self.filter.speckles {
             remove_speckles(estimate, &self.filter.options);
         }
+        if last && let Some(options) = self.filter.scraps().filter(|_| self.prepared.leaves_pixels_out()) {
+            remove_speckles(estimate, &options);
+        }
         if last && self.filter.gaps {
             fill_gaps(estimate, &self.filter.options);
         }

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// To be raised whenever the same input gives other depth maps than before.
-const REVISION: u64 = 1;
+const REVISION: u64 = 2;
 
 /// What maps are made by.
 #[derive(Clone, Copy)]
@@ -39,7 +39,11 @@ impl Recipe<'_> {
 
     /// Whether maps are cleaned of speckles or gaps.
     pub(super) fn cleans(&self) -> bool {
-        self.filter.speckles || self.filter.gaps
+        self.filter.speckles || self.filter.gaps || self.removes_scraps()
+    }
+
+    fn removes_scraps(&self) -> bool {
+        self.filter.scraps().is_some() && self.prepared.leaves_pixels_out()
     }
 
     fn matched(&self, view: ViewIndex) -> bool {
@@ -163,7 +167,7 @@ fn common(recipe: Recipe<'_>) -> BTreeMap<String, Digest> {
         d.text(env!("CARGO_PKG_VERSION")).number(REVISION);
     });
     let FilterJob { speckles, gaps, options, .. } = recipe.filter;
-    let options = format!("{speckles} {gaps} {options:?}");
+    let options = format!("{speckles} {gaps} {options:?} {}", recipe.removes_scraps());
     [("program version", program), ("estimation options", of_text(&format!("{:?}", recipe.options)))]
         .into_iter()
         .chain([(CLEANING, of_text(&options))])

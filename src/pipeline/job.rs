@@ -126,8 +126,7 @@ pub struct DensifyJob {
     pub outputs: Outputs,
 }
 
-/// "Depth Diff Threshold" that holds regions together before the unbiased filter: lower than OpenMVS's, so that scraps
-/// do not hang on to what they lie beside.
+/// "Depth Diff Threshold" that holds together what is no scrap.
 const SCRAP_DEPTH_DIFF: f32 = 0.006;
 
 /// Which filters run on the depth maps.
@@ -154,17 +153,22 @@ pub enum AcrossViews {
 
 impl FilterJob {
     /// What the unbiased filter goes with: itself alone, as it leaves few speckles and small regions that other views
-    /// confirm are worth keeping. `cut_out`: labels or masks leave pixels out, and scraps beside those are removed, too.
-    pub fn unbiased(cut_out: bool) -> Self {
+    /// confirm are worth keeping.
+    pub fn unbiased() -> Self {
         FilterJob {
-            speckles: cut_out,
+            speckles: false,
             gaps: false,
             across: Some(AcrossViews::Unbiased(UnbiasedFilterOptions::default())),
-            options: DepthFilterOptions {
-                depth_diff_threshold: SCRAP_DEPTH_DIFF,
-                ..DepthFilterOptions::default()
-            },
+            options: DepthFilterOptions::default(),
         }
+    }
+
+    /// How scraps are removed where labels or masks leave pixels out: before the unbiased filter, as beside what is cut
+    /// out they have but each other for a witness. Scraps hang on to what they lie beside less than speckles may.
+    pub(super) fn scraps(&self) -> Option<DepthFilterOptions> {
+        let unbiased = matches!(self.across, Some(AcrossViews::Unbiased(_)));
+        let depth_diff_threshold = SCRAP_DEPTH_DIFF.min(self.options.depth_diff_threshold);
+        unbiased.then_some(DepthFilterOptions { depth_diff_threshold, ..self.options })
     }
 
     /// What OpenMVS does: everything.
@@ -382,5 +386,23 @@ impl FuseJob {
         self.resolution.as_ref().map_or(Ok(()), ResolutionOptions::check)?;
         self.fusion.check()?;
         self.outputs.check(self.input.labels.is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_stand_for_filters() {
+        for bits in 0..8 {
+            let own = FilterJob::unbiased();
+            let job = FilterJob::from_bits(bits, AcrossViews::OpenMvs, own.options).unwrap();
+            assert_eq!(job.bits(), bits);
+            assert!(job.scraps().is_none(), "OpenMVS's filter is as it is there");
+        }
+        assert_eq!((FilterJob::unbiased().bits(), FilterJob::openmvs().bits()), (4, 7));
+        let scraps = FilterJob::unbiased().scraps().unwrap();
+        assert!(scraps.depth_diff_threshold < FilterJob::unbiased().options.depth_diff_threshold);
     }
 }

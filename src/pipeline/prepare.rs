@@ -53,6 +53,12 @@ impl Prepared {
             .ok_or_else(|| Error::invalid(format!("image {} takes no part", self.id(view))))
     }
 
+    /// Whether labels or masks leave pixels without a depth.
+    pub(super) fn leaves_pixels_out(&self) -> bool {
+        self.masks.is_some()
+            || self.labels.as_ref().is_some_and(|labels| !labels.policy().estimates_everything())
+    }
+
     /// Views that take part, in the scene's order.
     pub(super) fn views(&self) -> impl Iterator<Item = ViewIndex> + '_ {
         (0..self.cameras.len()).filter(|&i| self.cameras[i].is_some()).map(|i| ViewIndex(i as u32))

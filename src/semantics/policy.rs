@@ -254,6 +254,11 @@ impl ClassPolicy {
         self.border
     }
 
+    /// Whether pixels of every class get depths.
+    pub fn estimates_everything(&self) -> bool {
+        self.others_estimated && self.estimated.iter().all(|&estimated| estimated)
+    }
+
     /// Whether no class is dropped: then labels cannot remove a pixel by themselves.
     pub fn keeps_everything(&self) -> bool {
         self.others_kept && self.without_surface.is_empty() && self.kept.iter().all(|&kept| kept)
@@ -284,7 +289,7 @@ mod tests {
                 (0..=u16::MAX)
                     .all(|id| policy.is_kept(id) && policy.is_candidate(id) && policy.is_estimated(id))
             );
-            assert!(policy.keeps_everything());
+            assert!(policy.keeps_everything() && policy.estimates_everything());
         }
     }
 
@@ -294,6 +299,7 @@ mod tests {
         let default = policy("3dom-facade", &[], &[]).unwrap();
         assert_eq!((0..9).filter(|&id| !default.is_candidate(id)).collect::<Vec<u16>>(), [SKY]);
         assert!(default.is_kept(SKY) && default.is_estimated(SKY) && !default.keeps_everything());
+        assert!(default.estimates_everything());
         assert!(policy("3dom-facade", &["sky", "door"], &[]).unwrap().is_candidate(SKY));
         let off = ClassRules { consistency: Consistency::Off, ..ClassRules::default() };
         let off = ClassPolicy::new(&ClassTable::builtin("3dom-facade").unwrap(), &off).unwrap();
@@ -304,7 +310,7 @@ mod tests {
     fn classes_keep_only_what_they_name() {
         let policy = policy("3dom-facade", &["Building", "5"], &[]).unwrap();
         assert_eq!(kept(&policy, 0..=u16::MAX), [1, 5]);
-        assert!(!policy.keeps_everything());
+        assert!(!policy.keeps_everything() && !policy.estimates_everything());
         assert!(!policy.is_estimated(0) && policy.is_estimated(1) && !policy.is_estimated(60_000));
     }
 

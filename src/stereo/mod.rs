@@ -86,7 +86,7 @@ pub fn estimate(problem: &StereoProblem, options: &StereoOptions, cpu: CpuLevel)
                     shift: i as usize,
                     candidates: options.candidates as usize,
                     random: if start == Start::Random { 32 } else { 0 },
-                    random_if_bad: 4,
+                    random_if_bad: if halvings == coarsest { 8 } else { 4 },
                     refinements: options.refinements as usize,
                     views: options.compared_views as usize,
                     start,

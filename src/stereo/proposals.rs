@@ -3,7 +3,7 @@
 use super::level::Level;
 use super::plane::{InversePlane, Pinhole};
 use super::source_planes::SourcePlanes;
-use super::state::State;
+use super::state::{State, UNKNOWN};
 use super::tile::{CENTRE, TILE_H, TILE_W, Tile};
 use crate::geometry::{Camera, Size};
 use nalgebra::{Matrix3, Vector3};
@@ -60,8 +60,12 @@ impl Proposals {
                     if let Some(plane) = map.trusted(x, y)
                         && let Some((x, y, plane)) = view.seen_in(level, x as f32, y as f32, plane)
                     {
-                        let found = state.w[state.at(x, y)];
-                        proposals.add(x, y, plane, found, SAME / level.pixels_per_w);
+                        let at = state.at(x, y);
+                        let same = SAME / level.pixels_per_w;
+                        let known = state.cost[at] < UNKNOWN && (state.w[at] - plane.w).abs() < same;
+                        if state.active[at] > 0.5 && !known {
+                            proposals.add(x, y, plane, same);
+                        }
                     }
                 }
             }
@@ -75,12 +79,11 @@ impl Proposals {
         Proposals { columns: columns as i32, rows: rows as i32, cells }
     }
 
-    /// Adds a plane at pixel `(x, y)`, where inverse depth `found` is known, unless that is within `same` of it.
-    fn add(&mut self, x: i32, y: i32, plane: InversePlane, found: f32, same: f32) {
-        if (found - plane.w).abs() < same {
-            return;
-        }
-        for slot in &mut self.cells[(y / CELL * self.columns + x / CELL) as usize] {
+    /// Adds a plane at pixel `(x, y)`, or a vote to the one there that is within `same` of it. Where there is place for
+    /// neither, all planes of the cell lose a vote (Misra and Gries 1982): what most pixels propose stays.
+    fn add(&mut self, x: i32, y: i32, plane: InversePlane, same: f32) {
+        let cell = &mut self.cells[(y / CELL * self.columns + x / CELL) as usize];
+        for slot in cell.iter_mut() {
             if slot.votes == 0 {
                 *slot = Proposal { x, y, plane, votes: 1 };
                 return;
@@ -90,6 +93,7 @@ impl Proposals {
                 return;
             }
         }
+        cell.iter_mut().for_each(|slot| slot.votes -= 1);
     }
 
     /// Puts the proposals for pixels of the tile into `out`, those of most votes first.
@@ -136,7 +140,7 @@ impl SourceView {
     }
 
     /// The pixel of the reference where the surface at pixel `(x, y)` of the source falls, and its plane anchored there;
-    /// `None` outside the image, the depth range or behind the camera.
+    /// `None` outside the image, the depth range or behind the camera, and where the reference sees its back.
     fn seen_in(
         &self,
         level: &Level,
@@ -152,12 +156,16 @@ impl SourceView {
         }
         let (u, v) = (point.x / point.z * to.fx + to.cx, point.y / point.z * to.fy + to.cy);
         let (width, height) = (level.size.width as f32, level.size.height as f32);
-        if !(u >= -0.5 && v >= -0.5 && u < width - 0.5 && v < height - 0.5) {
+        if !(u > -0.5 && v > -0.5 && u < width - 0.5 && v < height - 0.5) {
             return None;
         }
         // m · X = 1 for the points X of the plane, so m' = T m / (1 + T m · C) for T X + C.
         let turned = self.turn * Vector3::from(from.plane_vector(plane, x, y));
-        let m = turned / (1.0 + turned.dot(&self.centre));
+        let facing = 1.0 + turned.dot(&self.centre);
+        if facing <= 0.0 {
+            return None;
+        }
+        let m = turned / facing;
         let (x, y) = (u.round(), v.round());
         let w = m.x * (x - to.cx) / to.fx + m.y * (y - to.cy) / to.fy + m.z;
         let (low, high) = level.w_range;
@@ -165,3 +173,7 @@ impl SourceView {
             .then(|| (x as i32, y as i32, InversePlane { w, wx: m.x / to.fx, wy: m.y / to.fy }))
     }
 }
+
+#[cfg(test)]
+#[path = "proposals_tests.rs"]
+mod tests;

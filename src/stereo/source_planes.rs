@@ -14,7 +14,7 @@ pub struct SourcePlanes {
     pub(crate) size: Size,
     /// Camera at that size.
     pub(crate) camera: Camera,
-    /// Two words a pixel: the bits of its inverse depth (0 = none), the last of which says whether it is trusted, and the upper halves of the bits of its change
+    /// Two words a pixel: the bits of its inverse depth (0 = none; the lowest bit says whether it is trusted), and the upper halves of the bits of its change
     /// per column (low half) and per row (high half).
     pub(crate) planes: Arc<[u32]>,
 }

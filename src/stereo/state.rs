@@ -11,7 +11,7 @@ use crate::scene::Grid;
 const INIT_PASS: u32 = u32::MAX;
 
 /// Cost of what is not known: the largest there is.
-const UNKNOWN: f32 = 2.0;
+pub(crate) const UNKNOWN: f32 = 2.0;
 
 /// Estimates of a level; pixel (x, y) is at [`State::at`].
 pub(crate) struct State {

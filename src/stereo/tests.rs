@@ -182,6 +182,34 @@ fn geometric_passes_do_not_lose_what_matching_found() {
 }
 
 #[test]
+fn what_a_view_has_missed_is_proposed_by_the_others() {
+    let options = StereoOptions::default();
+    let all: Vec<_> = (0..5).map(|i| problem(sphere_before_wall, i)).collect();
+    let maps: Vec<_> = all.iter().map(|(p, _)| estimate(p, &options, CpuLevel::detect()).unwrap()).collect();
+    let sources: Vec<_> = maps[1..].iter().map(|map| Some(Arc::new(SourcePlanes::new(map)))).collect();
+    let (p, truth) = &all[0];
+    // The first view has seen the wall alone.
+    let mut blind = maps[0].clone();
+    blind.depth.data_mut().fill(5.0);
+    blind.normal.as_mut().unwrap().data_mut().fill([0.0, 0.0, -1.0]);
+    let on_sphere = |e: &DepthEstimate| {
+        let sphere = e.depth.data().iter().zip(truth.data()).filter(|(_, t)| **t < 4.5);
+        let (found, all) = sphere
+            .fold((0, 0), |(found, all), (d, t)| (found + u32::from((d - t).abs() < RIGHT * t), all + 1));
+        f64::from(found) / f64::from(all)
+    };
+    let refine = |maps: &[Option<Arc<SourcePlanes>>], cpu| {
+        refine_geometric(p, &blind, maps, 0, &options, cpu).unwrap()
+    };
+    let alone = on_sphere(&refine(&[None, None, None, None], CpuLevel::Scalar));
+    let helped = refine(&sources, CpuLevel::Scalar);
+    assert!(on_sphere(&helped) > 0.8 && alone < 0.5, "{} {alone}", on_sphere(&helped));
+    for cpu in [CpuLevel::Neon, CpuLevel::Avx2, CpuLevel::Avx512].into_iter().filter(|l| l.is_supported()) {
+        assert_eq!(refine(&sources, cpu), helped, "{}", cpu.name());
+    }
+}
+
+#[test]
 fn skipped_pixels_get_no_depth_and_others_do() {
     let (mut problem, _) = problem(slanted, 0);
     let mut skip = Grid::filled(SIZE, false);

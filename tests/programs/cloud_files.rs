@@ -42,7 +42,7 @@ fn both_programs_write_laz_by_the_name() {
     }
     scratch
         .semvs(&format!(
-            "fuse scene.mvs --depth-maps . -o again.LAZ {LABELS} --number-views-fuse 3 --split-by-class --color-by-label"
+            "fuse scene.mvs --depth-maps . -o again.LAZ {LABELS} --number-views-fuse 3 --support unclaimed --split-by-class --color-by-label"
         ))
         .ok();
     assert_eq!(las_points(&scratch.path("again.LAZ")).len(), laz.len());

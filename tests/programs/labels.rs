@@ -79,7 +79,8 @@ fn all_views_together_see_through_blobs_in_each() {
 #[test]
 fn neighbouring_points_vote_once_more_when_asked() {
     let scratch = Scratch::with_maps();
-    let off = "--label-consistency off --label-votes merged";
+    // Few votes per point, so that there are errors.
+    let off = "--label-consistency off --label-votes merged --support unclaimed";
     let smooth = format!("{off} --label-smooth 8");
     let (truth, smooth_truth) = (fused(&scratch, off), fused(&scratch, &smooth));
     assert_eq!(truth.positions, smooth_truth.positions);

@@ -42,7 +42,11 @@ fn head(arg: &Arg, name: &str) -> String {
     };
     if arg.get_action().takes_values() {
         head.push_str(" arg");
-        let defaults: Vec<_> = arg.get_default_values().iter().map(|v| v.to_string_lossy()).collect();
+        let mut defaults: Vec<_> = arg.get_default_values().iter().map(|v| v.to_string_lossy()).collect();
+        if name == "postprocess-dmaps" {
+            // What it is with this program's default filter; with another one it is another.
+            defaults = vec!["7".into()];
+        }
         if !defaults.is_empty() {
             let _ = write!(head, " (={})", defaults.join(","));
         }

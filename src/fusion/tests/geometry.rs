@@ -1,5 +1,6 @@
 use super::*;
 use crate::scene::PointSource;
+use crate::scene::synthetic::{camera, view_of_plane};
 use nalgebra::Vector3;
 
 /// Distance from the wall that single precision causes.
@@ -31,6 +32,43 @@ fn points_lie_on_the_wall_and_use_every_pixel_once() {
         used += point.views.len() as u64;
     }
     assert!(used <= summary.depths);
+}
+
+#[test]
+fn claimed_depths_support_further_points_that_then_need_one_view_more() {
+    let supporting = |n| FusionOptions { number_views_fuse: n, ..FusionOptions::supporting() };
+    // Views of different resolution: a depth of the coarse ones falls on several of the fine one.
+    let mut views = row_of_views(4, 48, 36, 0.2, wall());
+    views[0] = view_of_plane(0, camera(96, 72, [0.0; 3], 0.0), wall());
+    let scene = TestScene::of(views);
+    let (few, _) = scene.fuse(&with_min_views(3));
+    let (many, summary) = scene.fuse(&supporting(3));
+    assert!(many.len() > few.len() * 2, "{} {}", many.len(), few.len());
+    assert!(many.len() <= summary.depths, "every point has a depth of its own");
+    assert!(many.iter().all(|p| distance_to_wall(p.position) < ON_WALL && p.views.len() >= 3));
+    assert!(many.iter().any(|p| p.views.len() == 3) && many.iter().any(|p| p.views.len() == 4));
+    let mut places: Vec<[u32; 3]> = many.iter().map(|p| p.position.map(f32::to_bits)).collect();
+    places.sort_unstable();
+    places.dedup();
+    assert_eq!(places.len() as u64, many.len(), "no point twice");
+
+    // Three views in all: what is claimed cannot help, as no fourth view is there.
+    let mut views = row_of_views(3, 48, 36, 0.2, wall());
+    views[0] = view_of_plane(0, camera(96, 72, [0.0; 3], 0.0), wall());
+    let scene = TestScene::of(views);
+    let (alone, _) = scene.fuse(&FusionOptions { support: Support::Unclaimed, ..supporting(3) });
+    let (helped, _) = scene.fuse(&supporting(3));
+    assert_eq!(helped, alone);
+}
+
+#[test]
+fn a_depth_that_is_in_the_way_of_a_point_supports_none() {
+    let mut scene = TestScene::wall(4);
+    scene.estimate(3).depth.data_mut().iter_mut().for_each(|d| *d *= 1.2);
+    let options = FusionOptions { number_views_fuse: 2, ..FusionOptions::supporting() };
+    let (points, summary) = scene.fuse(&options);
+    assert!(points.iter().all(|p| distance_to_wall(p.position) < ON_WALL || p.views == [ViewIndex(3)]));
+    assert!(summary.depths < 4 * 48 * 36, "some were discarded before their turn");
 }
 
 #[test]

@@ -84,6 +84,38 @@ fn another_class_neither_joins_nor_is_consumed_or_invalidated() {
 }
 
 #[test]
+fn claimed_depths_support_and_dissent_by_their_class() {
+    let all = |n| FusionOptions { number_views_fuse: n, ..FusionOptions::supporting() };
+    // Classes in turn by columns of the finest view: a claimed depth of the others supports what has its class.
+    let mut views = crate::scene::synthetic::row_of_views(4, 48, 36, 0.2, wall());
+    let fine = crate::scene::synthetic::camera(96, 72, [0.0; 3], 0.0);
+    views[0] = crate::scene::synthetic::view_of_plane(0, fine, wall());
+    let mut scene = TestScene::of(views);
+    scene.label(0, |x, _| if x % 2 == 0 { BUILDING } else { WINDOW });
+    (1..4).for_each(|i| scene.label(i, |_, _| BUILDING));
+    let (points, summary) = scene.try_fuse(&all(3), Some(&policy(Consistency::Support, &[]))).unwrap();
+    let (exclusive, _) = scene
+        .try_fuse(
+            &FusionOptions { support: Support::Unclaimed, ..all(3) },
+            Some(&policy(Consistency::Support, &[])),
+        )
+        .unwrap();
+    assert!(points.len() > exclusive.len() * 3 / 2, "{} {}", points.len(), exclusive.len());
+    assert!(points.iter().all(|p| p.label == BUILDING));
+    assert!(class(&summary, WINDOW).points == 0 && class(&summary, WINDOW).rejected_by_consistency > 1000);
+    let (strict, _) = scene.try_fuse(&all(3), Some(&policy(Consistency::Strict, &[]))).unwrap();
+    assert!(strict.len() <= points.len() && strict.iter().all(|p| p.label == BUILDING));
+
+    // Whom agreement on the class would not have helped is not counted as rejected by it.
+    let scene = labelled_wall([BUILDING, WINDOW, WINDOW, WINDOW]);
+    let (_, summary) = scene.try_fuse(&all(5), Some(&policy(Consistency::Support, &[]))).unwrap();
+    assert!(class(&summary, BUILDING).rejected_by_consistency > 1000, "four of the four there are");
+    let lonely = labelled_wall([BUILDING, BUILDING, WINDOW, 0]);
+    let (points, _) = lonely.try_fuse(&all(4), Some(&policy(Consistency::Support, &[]))).unwrap();
+    assert_eq!(points.len(), 0, "three views agree, four are asked for");
+}
+
+#[test]
 fn void_supports_every_class() {
     let scene = labelled_wall([0, BUILDING, 0, BUILDING]);
     let support = policy(Consistency::Support, &[]);

@@ -13,7 +13,7 @@ struct CountingSource {
 impl CountingSource {
     /// Fuses a line of `count` views, each knowing two on either side; returns the cloud, the largest number of
     /// maps alive at any time, and the number of loads.
-    fn fuse_line(count: u32, map_memory: u64) -> (PointCloud, usize, usize) {
+    fn fuse_line(count: u32, options: FusionOptions) -> (PointCloud, usize, usize) {
         let source = CountingSource { scene: TestScene::wall(count), alive: Mutex::default() };
         let views: Vec<FusionView> = (0..count as i64)
             .map(|i| FusionView {
@@ -28,7 +28,6 @@ impl CountingSource {
             })
             .collect();
         let input = FusionInput { views: &views, source: &source, policy: None };
-        let options = FusionOptions { map_memory, ..with_min_views(3) };
         let mut points = PointCloud::new(input.layout(&options));
         fuse(&input, &options, &Progress::silent(), &mut points).unwrap();
         let (_, most, loads) = *source.alive.lock().unwrap();
@@ -50,12 +49,16 @@ impl MapSource for CountingSource {
     }
 }
 
+fn unlimited() -> FusionOptions {
+    FusionOptions { map_memory: u64::MAX, ..with_min_views(3) }
+}
+
 #[test]
 fn maps_leave_memory_after_their_last_use() {
-    let (cloud, most, loads) = CountingSource::fuse_line(12, u64::MAX);
+    let (cloud, most, loads) = CountingSource::fuse_line(12, unlimited());
     assert_eq!(loads, 12, "every map is read once");
     assert!(most <= 6, "{most} maps in memory");
-    let (long, most_long, _) = CountingSource::fuse_line(16, u64::MAX);
+    let (long, most_long, _) = CountingSource::fuse_line(16, unlimited());
     assert_eq!(most_long, most, "the length of the line does not matter");
     assert!(cloud.iter().count() < long.iter().count());
 }
@@ -63,24 +66,29 @@ fn maps_leave_memory_after_their_last_use() {
 #[test]
 fn a_small_budget_gives_the_same_cloud() {
     // More than sixteen views: ties in the order of views are mixed, so maps are needed again after long pauses.
-    let (unlimited, most, loads) = CountingSource::fuse_line(40, u64::MAX);
-    let (limited, most_limited, loads_limited) = CountingSource::fuse_line(40, 0);
-    assert!(most > 10 && loads == 40, "{most} maps, {loads} loads");
-    assert!(most_limited <= 5, "a view and its four neighbours: {most_limited}");
-    assert!(loads_limited > 40);
-    assert_eq!(unlimited, limited);
+    for options in [FusionOptions::default(), FusionOptions::supporting()] {
+        let within = |map_memory| CountingSource::fuse_line(40, FusionOptions { map_memory, ..options });
+        let (unlimited, most, loads) = within(u64::MAX);
+        let (limited, most_limited, loads_limited) = within(0);
+        assert!(most > 10 && loads == 40, "{most} maps, {loads} loads");
+        assert!(most_limited <= 5, "a view and its four neighbours: {most_limited}");
+        assert!(loads_limited > 40);
+        assert_eq!(unlimited, limited);
+    }
 }
 
 #[test]
 fn the_cloud_does_not_depend_on_the_number_of_threads() {
     let scene = TestScene::of(row_of_views(5, 160, 120, 0.2, wall()));
-    let fuse_with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| scene.fuse(&with_min_views(3)))
-    };
-    let one = fuse_with(1);
-    assert_eq!(one, fuse_with(2));
-    assert_eq!(one, fuse_with(5));
+    for options in [FusionOptions::default(), FusionOptions::supporting()] {
+        let fuse_with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| scene.fuse(&options))
+        };
+        let one = fuse_with(1);
+        assert_eq!(one, fuse_with(2));
+        assert_eq!(one, fuse_with(5));
+    }
 }
 
 /// Fails at the third point.
