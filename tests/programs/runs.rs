@@ -4,6 +4,7 @@ use crate::common::{FUSE_ONLY, SMALL, Scratch};
 use semvs_formats::Limits;
 use semvs_formats::dmap::DepthMapFile;
 use semvs_formats::ply::Cloud;
+use serde_json::json;
 use std::collections::BTreeMap;
 
 const LABELS: &str = "--label-path labels --class-table 3dom-facade";
@@ -244,4 +245,53 @@ fn the_written_scene_finds_its_images_from_anywhere() {
     scratch.semvs(&format!("densify scene.mvs -o out/cloud.ply -w maps/deep {keep}")).ok();
     scratch.semvs("fuse out/cloud.mvs --depth-maps maps/deep -o again.ply").ok();
     assert_eq!(scratch.read("out/cloud.ply"), scratch.read("again.ply"));
+}
+
+#[test]
+fn each_program_has_its_own_filter_and_fusion() {
+    let scratch = Scratch::facade6();
+    let options = |file: &str| -> [serde_json::Value; 3] {
+        let json: serde_json::Value = serde_json::from_slice(&scratch.read(file)).unwrap();
+        ["filter", "postprocess-dmaps", "support"].map(|name| json["options"][name].clone())
+    };
+    let semvs = |folder: &str, words: &str| {
+        let out = format!("-w {folder} -o {folder}/x.ply --report {folder}.json");
+        scratch.semvs(&format!("densify scene.mvs {out} {SMALL} {words}")).ok();
+        (options(&format!("{folder}.json")), scratch.read(&format!("{folder}/x.ply")))
+    };
+    let (own, cloud) = semvs("own", "");
+    assert_eq!(own, [json!("unbiased"), json!(4), json!("all")]);
+    assert_eq!(semvs("openmvs", "--filter openmvs").0, [json!("openmvs"), json!(7), json!("all")]);
+    scratch.densify_point_cloud(&format!("scene.mvs -o x --report drop.json {SMALL}")).ok();
+    assert_eq!(options("drop.json"), [json!("openmvs"), json!(7), json!("unclaimed")]);
+    // A dense config file that was written with OpenMVS's defaults asks for nothing.
+    for folder in ["written", "read"] {
+        assert!(semvs(folder, "--dense-config-file Densify.ini").1 == cloud, "{folder}");
+    }
+}
+
+#[test]
+fn a_class_that_the_table_drops_is_as_good_as_excluded() {
+    let scratch = Scratch::facade6();
+    let class = |id: u32, name: &str, color: &str, more: &str| {
+        format!("[[class]]\nid = {id}\nname = \"{name}\"\ncolor = [{color}]\n{more}\n")
+    };
+    let table = |more: &str| {
+        "name = \"facade\"\nvoid-colors = [[0, 0, 0]]\n".to_owned()
+            + &class(1, "building", "0, 0, 255", "")
+            + &class(2, "sky", "255, 255, 0", more)
+            + &class(3, "obstacle", "255, 0, 0", more)
+            + &class(4, "window", "0, 255, 0", "")
+            + &class(5, "door", "255, 0, 255", "")
+    };
+    std::fs::write(scratch.path("all.toml"), table("")).unwrap();
+    std::fs::write(scratch.path("some.toml"), table("keep = false")).unwrap();
+    let cloud = |folder: &str, words: &str| {
+        let out = format!("-w {folder} -o {folder}/x.ply --label-path labels");
+        scratch.semvs(&format!("densify scene.mvs {out} {SMALL} {words}")).ok();
+        scratch.cloud(&format!("{folder}/x.ply"))
+    };
+    let excluded = cloud("excluded", "--class-table all.toml --exclude-classes sky,obstacle");
+    assert_eq!(cloud("dropped", "--class-table some.toml"), excluded);
+    assert!(excluded.len() > 5000);
 }
