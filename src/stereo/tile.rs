@@ -96,6 +96,12 @@ pub(crate) struct Halo {
     pub(crate) on: HaloMap,
     /// One over the lengths that the vectors of the tile's own pixels had.
     pub(crate) inverse_length: TileMap,
+    /// Smoothness factor of every pixel's own plane by the pixels to its left and right.
+    pub(crate) beside: TileMap,
+    /// The same by the pixel above.
+    pub(crate) above: TileMap,
+    /// The same by the pixel below.
+    pub(crate) below: TileMap,
     /// The surround's columns beside the tile once more.
     pub(crate) sides: Sides,
 }
@@ -187,6 +193,9 @@ impl Tile {
                 w: ZERO_HALO,
                 on: ZERO_HALO,
                 inverse_length: ZERO_TILE,
+                beside: ZERO_TILE,
+                above: ZERO_TILE,
+                below: ZERO_TILE,
                 sides: Sides { nx: ZERO_ROW, ny: ZERO_ROW, nz: ZERO_ROW, w: ZERO_ROW, on: ZERO_ROW },
             },
             scratch: Scratch {

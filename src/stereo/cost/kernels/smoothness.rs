@@ -138,6 +138,9 @@ pub(in crate::stereo::cost) fn begin<L: Lanes>(tile: &mut Tile, level: &Level) {
         }
     }
     for y in 0..TILE_H {
+        agree_beside::<L>(tile, y);
+        agree_above::<L>(tile, y);
+        agree_below::<L>(tile, y);
         totals::<L>(tile, y);
     }
 }
@@ -149,7 +152,7 @@ fn put<L: Lanes>(row: &mut [f32], lanes: L) {
     }
 }
 
-/// Brings vectors and totals up to date after pixels of the `changed` rows have taken another plane.
+/// Brings vectors, agreements and totals up to date after pixels of the `changed` rows have taken another plane.
 #[inline(always)]
 pub(super) fn refresh<L: Lanes>(tile: &mut Tile, level: &Level, changed: u32) {
     let column = L::splat(tile.x0 as f32) + L::load(&LANE);
@@ -164,9 +167,61 @@ pub(super) fn refresh<L: Lanes>(tile: &mut Tile, level: &Level, changed: u32) {
         r.store(&mut halo.inverse_length[y]);
         put(&mut halo.w[y + 1], planes[0]);
     }
-    let affected = changed | changed << 1 | changed >> 1;
-    for y in (0..TILE_H).filter(|y| affected >> y & 1 != 0) {
+    let (below, above) = (changed | changed << 1, changed | changed >> 1);
+    for y in (0..TILE_H).filter(|y| (below | above) >> y & 1 != 0) {
+        if changed >> y & 1 != 0 {
+            agree_beside::<L>(tile, y);
+        }
+        if below >> y & 1 != 0 {
+            agree_above::<L>(tile, y);
+        }
+        if above >> y & 1 != 0 {
+            agree_below::<L>(tile, y);
+        }
         totals::<L>(tile, y);
+    }
+}
+
+/// What the pixels beside those of row `y` say about their planes.
+#[inline(always)]
+fn agree_beside<L: Lanes>(tile: &mut Tile, y: usize) {
+    let (w, slope) = (L::load(&tile.belief.w[y]), L::load(&tile.belief.wx[y]));
+    let (unit, r) = own::<L>(tile, y);
+    let left = agreement(unit, r, w - slope, there(tile, y + 1, 0));
+    let right = agreement(unit, r, w + slope, there(tile, y + 1, 2));
+    (left * right).store(&mut tile.halo.beside[y]);
+}
+
+/// What the pixels above those of row `y` say about their planes.
+#[inline(always)]
+fn agree_above<L: Lanes>(tile: &mut Tile, y: usize) {
+    let w = L::load(&tile.belief.w[y]) - L::load(&tile.belief.wy[y]);
+    let (unit, r) = own::<L>(tile, y);
+    agreement(unit, r, w, there(tile, y, 1)).store(&mut tile.halo.above[y]);
+}
+
+/// What the pixels below those of row `y` say about their planes.
+#[inline(always)]
+fn agree_below<L: Lanes>(tile: &mut Tile, y: usize) {
+    let w = L::load(&tile.belief.w[y]) + L::load(&tile.belief.wy[y]);
+    let (unit, r) = own::<L>(tile, y);
+    agreement(unit, r, w, there(tile, y + 2, 1)).store(&mut tile.halo.below[y]);
+}
+
+/// Unit vectors of the planes of row `y` of the tile, and one over the lengths they had.
+#[inline(always)]
+fn own<L: Lanes>(tile: &Tile, y: usize) -> ([L; 3], L) {
+    (there(tile, y + 1, 1).unit, L::load(&tile.halo.inverse_length[y]))
+}
+
+/// Planes of row `y` of the surround from column `x` on.
+#[inline(always)]
+fn there<L: Lanes>(tile: &Tile, y: usize, x: usize) -> Planes<L> {
+    let halo = &tile.halo;
+    Planes {
+        unit: [cut(&halo.nx[y], x), cut(&halo.ny[y], x), cut(&halo.nz[y], x)],
+        w: cut(&halo.w[y], x),
+        on: cut(&halo.on[y], x),
     }
 }
 
@@ -174,19 +229,7 @@ pub(super) fn refresh<L: Lanes>(tile: &mut Tile, level: &Level, changed: u32) {
 #[inline(always)]
 fn totals<L: Lanes>(tile: &mut Tile, y: usize) {
     let (halo, belief) = (&tile.halo, &mut tile.belief);
-    let (w, wx, wy) = (L::load(&belief.w[y]), L::load(&belief.wx[y]), L::load(&belief.wy[y]));
-    let r = L::load(&halo.inverse_length[y]);
-    let there = |y: usize, x: usize| Planes {
-        unit: [cut(&halo.nx[y], x), cut(&halo.ny[y], x), cut(&halo.nz[y], x)],
-        w: cut(&halo.w[y], x),
-        on: cut(&halo.on[y], x),
-    };
-    let unit = there(y + 1, 1).unit;
-    let left = agreement(unit, r, w - wx, there(y + 1, 0));
-    let right = agreement(unit, r, w + wx, there(y + 1, 2));
-    let up = agreement(unit, r, w - wy, there(y, 1));
-    let down = agreement(unit, r, w + wy, there(y + 2, 1));
-    let smooth = (left * right) * (up * down);
+    let smooth = L::load(&halo.beside[y]) * (L::load(&halo.above[y]) * L::load(&halo.below[y]));
     let prior = (L::load(&belief.prior_w[y]), L::load(&belief.prior_k[y]));
-    total(L::load(&belief.data[y]), smooth, w, prior).store(&mut belief.total[y]);
+    total(L::load(&belief.data[y]), smooth, L::load(&belief.w[y]), prior).store(&mut belief.total[y]);
 }
