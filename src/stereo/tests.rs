@@ -165,31 +165,37 @@ fn every_cpu_level_and_every_run_gives_the_same_bytes() {
     assert_ne!(estimate(&problem, &other, CpuLevel::Scalar).unwrap().depth, first.depth);
 }
 
+/// The first view of the sphere, its depths, what matching finds there, and the planes of what it finds in the others.
+fn matched(
+    options: &StereoOptions,
+) -> (StereoProblem, Grid<f32>, DepthEstimate, Vec<Option<Arc<SourcePlanes>>>) {
+    let find = |p: &StereoProblem| estimate(p, options, CpuLevel::detect()).unwrap();
+    let (first, truth) = problem(sphere_before_wall, 0);
+    let others = (1..5).map(|i| find(&problem(sphere_before_wall, i).0));
+    let sources = others.map(|map| Some(Arc::new(SourcePlanes::new(&map)))).collect();
+    let map = find(&first);
+    (first, truth, map, sources)
+}
+
 #[test]
 fn geometric_passes_do_not_lose_what_matching_found() {
     let options = StereoOptions::default();
-    let all: Vec<_> = (0..5).map(|i| problem(sphere_before_wall, i)).collect();
-    let maps: Vec<_> = all.iter().map(|(p, _)| estimate(p, &options, CpuLevel::detect()).unwrap()).collect();
-    let sources: Vec<_> = maps[1..].iter().map(|map| Some(Arc::new(SourcePlanes::new(map)))).collect();
-    let (p, truth) = &all[0];
-    let refined = refine_geometric(p, &maps[0], &sources, 0, &options, CpuLevel::detect()).unwrap();
+    let (p, truth, map, sources) = &matched(&options);
+    let refined = refine_geometric(p, map, sources, 0, &options, CpuLevel::detect()).unwrap();
     let right = |e: &DepthEstimate| {
         let valid = e.depth.data().iter().filter(|d| **d > 0.0).count() as f64;
         share_right(e, truth) * SIZE.area() as f64 / valid
     };
-    assert!(right(&refined) >= right(&maps[0]), "{} {}", right(&refined), right(&maps[0]));
+    assert!(right(&refined) >= right(map), "{} {}", right(&refined), right(map));
     assert!(share_right(&refined, truth) > 0.9);
 }
 
 #[test]
 fn what_a_view_has_missed_is_proposed_by_the_others() {
     let options = StereoOptions::default();
-    let all: Vec<_> = (0..5).map(|i| problem(sphere_before_wall, i)).collect();
-    let maps: Vec<_> = all.iter().map(|(p, _)| estimate(p, &options, CpuLevel::detect()).unwrap()).collect();
-    let sources: Vec<_> = maps[1..].iter().map(|map| Some(Arc::new(SourcePlanes::new(map)))).collect();
-    let (p, truth) = &all[0];
+    let (p, truth, map, sources) = &matched(&options);
     // The first view has seen the wall alone.
-    let mut blind = maps[0].clone();
+    let mut blind = map.clone();
     blind.depth.data_mut().fill(5.0);
     blind.normal.as_mut().unwrap().data_mut().fill([0.0, 0.0, -1.0]);
     let on_sphere = |e: &DepthEstimate| {
@@ -202,10 +208,10 @@ fn what_a_view_has_missed_is_proposed_by_the_others() {
         refine_geometric(p, &blind, maps, 0, &options, cpu).unwrap()
     };
     let alone = on_sphere(&refine(&[None, None, None, None], CpuLevel::Scalar));
-    let helped = refine(&sources, CpuLevel::Scalar);
+    let helped = refine(sources, CpuLevel::Scalar);
     assert!(on_sphere(&helped) > 0.8 && alone < 0.5, "{} {alone}", on_sphere(&helped));
     for cpu in [CpuLevel::Neon, CpuLevel::Avx2, CpuLevel::Avx512].into_iter().filter(|l| l.is_supported()) {
-        assert_eq!(refine(&sources, cpu), helped, "{}", cpu.name());
+        assert_eq!(refine(sources, cpu), helped, "{}", cpu.name());
     }
 }
 
