@@ -25,7 +25,7 @@ pub(crate) struct State {
     pub(crate) wy: Vec<f32>,
     /// Matching cost.
     pub(crate) cost: Vec<f32>,
-    /// Inverse depth of the coarser level; 0 = none.
+    /// Depth at the coarser level; 0 = none.
     pub(crate) prior: Vec<f32>,
     /// 1 for pixels to estimate, 0 for skipped ones and the margin.
     pub(crate) active: Vec<f32>,
@@ -120,7 +120,7 @@ impl State {
                 let at = s.at(x as i32, y as i32);
                 let w = p.w.clamp(level.w_range.0, level.w_range.1);
                 s.set(at, InversePlane { w, wx: p.wx * rx, wy: p.wy * ry });
-                s.prior[at] = w;
+                s.prior[at] = 1.0 / w;
                 s.cost[at] = coarse.cost[coarse.at(ix, iy)];
             }
         }

@@ -73,8 +73,8 @@ pub(crate) struct Belief {
     pub(crate) data: TileMap,
     /// Cost with smoothness and prior: what candidates compete with.
     pub(crate) total: TileMap,
-    /// Inverse depth of the coarser level.
-    pub(crate) prior_w: TileMap,
+    /// Depth at the coarser level; 0 = none.
+    pub(crate) prior_z: TileMap,
     /// Weight of the prior, 0..1: near 1 where there is no texture.
     pub(crate) prior_k: TileMap,
     /// 1 for pixels that are estimated, 0 for skipped ones and outside the image.
@@ -182,7 +182,7 @@ impl Tile {
                 wy: ZERO_TILE,
                 data: ZERO_TILE,
                 total: ZERO_TILE,
-                prior_w: ZERO_TILE,
+                prior_z: ZERO_TILE,
                 prior_k: ZERO_TILE,
                 active: ZERO_TILE,
             },
@@ -254,7 +254,7 @@ impl Tile {
             b.wx[y].copy_from_slice(&state.wx[cut.clone()]);
             b.wy[y].copy_from_slice(&state.wy[cut.clone()]);
             b.data[y].copy_from_slice(&state.cost[cut.clone()]);
-            b.prior_w[y].copy_from_slice(&state.prior[cut.clone()]);
+            b.prior_z[y].copy_from_slice(&state.prior[cut.clone()]);
             b.active[y].copy_from_slice(&state.active[cut]);
         }
         for y in 0..TILE_H + 2 {

@@ -9,11 +9,11 @@ use crate::stereo::tile::{CENTRE, ROBUST_COST, TILE_H, Tile};
 const PRIOR_CAP: f32 = 0.5;
 
 /// Matching cost with smoothness, blended towards agreement with the coarser level where there is no texture.
-/// `prior` is the coarser level's inverse depth and its weight.
+/// `prior` is the depth there and its weight.
 #[inline(always)]
 pub(super) fn total<L: Lanes>(data: L, smooth: L, w: L, prior: (L, L)) -> L {
     let t = L::select(data.lt(L::splat(ROBUST_COST)), data * smooth, data);
-    let off = (prior.0 / w.max(L::splat(1e-30)) - L::splat(1.0)).abs().min(L::splat(PRIOR_CAP));
+    let off = (w * prior.0 - L::splat(1.0)).abs().min(L::splat(PRIOR_CAP));
     t + prior.1 * (off - t)
 }
 
@@ -27,7 +27,7 @@ pub(super) fn accept<L: Lanes>(tile: &mut Tile, p: InversePlane, low: f32, high:
         let data: L = merged(&scratch.best[y], &scratch.second[y]);
         let smooth = L::load(&scratch.factor[y]);
         let w = L::splat(p.w + p.wy * (y as f32 - CENTRE.1)) + along;
-        let t = total(data, smooth, w, (L::load(&belief.prior_w[y]), L::load(&belief.prior_k[y])));
+        let t = total(data, smooth, w, (L::load(&belief.prior_z[y]), L::load(&belief.prior_k[y])));
         let old = L::load(&belief.total[y]);
         let possible = L::both(L::splat(low).le(w), w.le(L::splat(high)));
         let better = L::both(t.lt(old), L::both(possible, L::splat(0.5).lt(L::load(&belief.active[y]))));

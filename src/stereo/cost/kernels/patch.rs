@@ -41,7 +41,7 @@ pub(in crate::stereo::cost) fn prepare<L: Lanes>(tile: &mut Tile, level: &Level)
     let (patch, belief) = (&tile.patch, &mut tile.belief);
     for y in 0..TILE_H {
         let k = L::bell64(L::load(&patch.norm[y]) * L::splat(PRIOR_FALLOFF));
-        let known = L::splat(0.0).lt(L::load(&belief.prior_w[y]));
+        let known = L::splat(0.0).lt(L::load(&belief.prior_z[y]));
         L::select(known, k, L::splat(0.0)).store(&mut belief.prior_k[y]);
     }
 }

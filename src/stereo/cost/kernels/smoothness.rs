@@ -230,6 +230,6 @@ fn there<L: Lanes>(tile: &Tile, y: usize, x: usize) -> Planes<L> {
 fn totals<L: Lanes>(tile: &mut Tile, y: usize) {
     let (halo, belief) = (&tile.halo, &mut tile.belief);
     let smooth = L::load(&halo.beside[y]) * (L::load(&halo.above[y]) * L::load(&halo.below[y]));
-    let prior = (L::load(&belief.prior_w[y]), L::load(&belief.prior_k[y]));
+    let prior = (L::load(&belief.prior_z[y]), L::load(&belief.prior_k[y]));
     total(L::load(&belief.data[y]), smooth, L::load(&belief.w[y]), prior).store(&mut belief.total[y]);
 }

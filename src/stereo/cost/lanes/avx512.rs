@@ -285,6 +285,24 @@ impl Pairs for SixteenPairs {
 
     #[inline(always)]
     fn plus_dot(self, a: Self, b: Self) -> Self {
-        SixteenPairs(unsafe { _mm512_dpwssd_epi32(self.0, a.0, b.0) })
+        // SAFETY: the feature is there.
+        SixteenPairs(unsafe { plus_dot(self.0, a.0, b.0) })
     }
+}
+
+/// `VPDPWSSD`, which compilers tear into two instructions where it is written as an intrinsic.
+#[inline]
+#[target_feature(enable = "avx512f,avx512vnni")]
+fn plus_dot(mut sum: __m512i, a: __m512i, b: __m512i) -> __m512i {
+    // SAFETY: it reads and writes the named registers alone.
+    unsafe {
+        std::arch::asm!(
+            "vpdpwssd {sum}, {a}, {b}",
+            sum = inout(zmm_reg) sum,
+            a = in(zmm_reg) a,
+            b = in(zmm_reg) b,
+            options(pure, nomem, nostack, preserves_flags),
+        );
+    }
+    sum
 }
