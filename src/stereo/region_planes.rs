@@ -110,8 +110,7 @@ impl Drawer<'_> {
                     let plane = region_plane.plane.moved((x0 + x) as f32, (y0 + y) as f32);
                     let w = plane.w.max(f32::MIN_POSITIVE);
                     let b = &mut tile.belief;
-                    (b.w[y][x], b.wx[y][x], b.wy[y][x], b.prior_z[y][x]) =
-                        (w, plane.wx, plane.wy, 1.0 / w);
+                    (b.w[y][x], b.wx[y][x], b.wy[y][x], b.prior_z[y][x]) = (w, plane.wx, plane.wy, 1.0 / w);
                 }
             }
             (self.kernels.prepare)(tile, self.level);

@@ -78,9 +78,24 @@ impl Warp {
         (u, v, z)
     }
 
+    /// Whether the tile's window is inside for sure: a cheap test that few windows inside fail.
+    #[inline(always)]
+    fn well_inside(&self, max_u: f32, max_v: f32) -> bool {
+        let far_u = (self.du_dx.abs() * HALF.0 + self.du_dy.abs() * HALF.1) * (1.0 + 2.0 * SMOOTH) + SLACK;
+        let far_v = (self.dv_dx.abs() * HALF.0 + self.dv_dy.abs() * HALF.1) * (1.0 + 2.0 * SMOOTH) + SLACK;
+        self.nearly_quadratic()
+            && self.u - far_u >= 1.0
+            && self.v - far_v >= 1.0
+            && self.u + far_u <= max_u
+            && self.v + far_v <= max_v
+    }
+
     /// Coverage of the tile's window.
     #[inline(always)]
     fn coverage(&self, max_u: f32, max_v: f32) -> Coverage {
+        if self.well_inside(max_u, max_v) {
+            return Coverage::Whole;
+        }
         let mut inside = 0;
         let mut out = [0; 4];
         for (sx, sy) in [(-HALF.0, -HALF.1), (HALF.0, -HALF.1), (-HALF.0, HALF.1), HALF] {
@@ -178,28 +193,23 @@ fn sample<L: Lanes, const WHOLE: bool>(source: &Source, m: &Warp, scratch: &mut 
 #[inline(always)]
 fn smooth<L: Lanes, const ROWS: usize>(source: &Source, m: &Warp, scratch: &mut Scratch) {
     let shift = L::whole(source.level_at(m.u, m.v).wrapping_neg());
-    let low =
-        [Footprint::of(m, m.du_dx, m.du_dy).low_fixed(), Footprint::of(m, m.dv_dx, m.dv_dy).low_fixed()];
+    let (width, bytes, quads) = (source.width, &source.bytes[..], &source.quads[..]);
+    let corners = if ROWS > 0 { Corners::new::<L>(m, width) } else { Corners::NONE };
     for c in 0..WIN_W / COLUMNS {
         let mut column = Column::<L>::new(m, c);
-        let mut corner = column.first_lane();
         let mut above = L::whole(0);
         for k in 0..WIN_H / 2 {
-            let (u, v) = (column.at[0], column.at[1]);
-            let texels = if ROWS == 0 {
-                texels::<L>(source, u, v)
+            let [u, v] = column.at;
+            let quads = if ROWS == 0 {
+                L::gather(quads, L::place(u, v, width as u32))
             } else {
-                let [x, y] = [0, 1].map(|i| (corner.at[i] + low[i]).max(0) as u32 >> 16);
-                let memory = source.bytes.get(y as usize * source.width + x as usize..).unwrap_or(&[]);
-                let (du, dv) = (
-                    L::plus(u, L::whole((x << 16).wrapping_neg())),
-                    L::plus(v, L::whole((y << 16).wrapping_neg())),
-                );
-                L::bilinear(L::lookup::<ROWS>(memory, source.width, du, dv), u, v)
+                let (i, first) = (c * STEPS + k, corners.offset[c * STEPS + k] as usize);
+                let (right, down) =
+                    (L::plus(u, L::whole(corners.back[i])), L::plus(v, L::whole(corners.up[i])));
+                L::lookup::<ROWS>(bytes, first, width, right, down)
             };
-            let texels = L::plus(texels, shift);
+            let texels = L::plus(L::bilinear(quads, u, v), shift);
             column.advance();
-            corner.advance();
             if k > 0 {
                 put::<L>(L::paired(above, texels), &mut scratch.warped[2 * k - 2..], c);
             }
@@ -207,6 +217,74 @@ fn smooth<L: Lanes, const ROWS: usize>(source: &Source, m: &Warp, scratch: &mut 
         }
         put::<L>(L::paired(above, L::whole(0)), &mut scratch.warped[WIN_H - 2..], c);
     }
+}
+
+/// Vectors of a column of the window.
+const STEPS: usize = WIN_H / 2;
+/// Numbers of vectors of the window, in whole registers.
+const CORNERS: usize = 2 * TILE_W;
+
+/// For every vector of the window, a corner of the source before all of its texels.
+struct Corners {
+    /// Position in the source, row by row.
+    offset: [u32; CORNERS],
+    /// What takes fixed-point columns to those from the corner on.
+    back: [u32; CORNERS],
+    /// The same for rows.
+    up: [u32; CORNERS],
+}
+
+impl Corners {
+    const NONE: Self = Corners { offset: [0; CORNERS], back: [0; CORNERS], up: [0; CORNERS] };
+
+    #[inline(always)]
+    fn new<L: Lanes>(m: &Warp, width: usize) -> Self {
+        let mut out = Corners::NONE;
+        let low =
+            [Footprint::of(m, m.du_dx, m.du_dy).low_fixed(), Footprint::of(m, m.dv_dx, m.dv_dy).low_fixed()];
+        let step = L::load(&CORNER_Y);
+        for half in 0..CORNERS / TILE_W {
+            let ox = L::load(&CORNER_X) + L::splat((2 * half * COLUMNS) as f32);
+            let e = ox * L::splat(m.z_dx) + step * L::splat(m.z_dy);
+            let u = corner(m.u, m.du_dx, m.du_dy, low[0], (ox, step, e));
+            let v = corner(m.v, m.dv_dx, m.dv_dy, low[1], (ox, step, e));
+            let cut = half * TILE_W;
+            for (words, to) in [
+                (L::place(u, v, width as u32), &mut out.offset),
+                (L::negated(L::masked(u, 0xffff_0000)), &mut out.back),
+                (L::negated(L::masked(v, 0xffff_0000)), &mut out.up),
+            ] {
+                if let Some(to) = to[cut..].first_chunk_mut() {
+                    L::store_words(words, to);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// The low end of where the texels of vectors are whose first ones have offsets `(ox, oy)` from the centre, in fixed point;
+/// `e` is how much farther away they are.
+#[inline(always)]
+fn corner<L: Lanes>(centre: f32, dx: f32, dy: f32, low: f32, (ox, oy, e): (L, L, L)) -> L::Bits {
+    let straight = ox * L::splat(dx * FIXED) + oy * L::splat(dy * FIXED);
+    let at = L::splat(centre * FIXED + low) + straight * (L::splat(1.0) - e);
+    at.max(L::splat(0.0)).truncated()
+}
+
+/// Offsets of the first texels of vectors from the window's centre: two columns of it, from top to bottom.
+const CORNER_X: Row = corner_offsets(true);
+const CORNER_Y: Row = corner_offsets(false);
+
+const fn corner_offsets(columns: bool) -> Row {
+    let mut out = [0.0; TILE_W];
+    let mut i = 0;
+    while i < TILE_W {
+        out[i] =
+            if columns { (i / STEPS * COLUMNS) as f32 - HALF.0 } else { (i % STEPS * 2) as f32 - HALF.1 };
+        i += 1;
+    }
+    out
 }
 
 /// How far source pixels of eight columns of two rows can be from the first one, one coordinate.
@@ -235,8 +313,8 @@ impl Footprint {
     }
 
     #[inline(always)]
-    fn low_fixed(&self) -> i32 {
-        ((self.low - 0.5 * SLACK) * FIXED) as i32
+    fn low_fixed(&self) -> f32 {
+        (self.low - 0.5 * SLACK) * FIXED
     }
 
     /// Rows of sixteen source pixels that hold sixteen texels and their neighbours: 4, 8, or 0 if they do not.
@@ -307,32 +385,6 @@ impl<L: Lanes> Column<L> {
         for i in 0..2 {
             self.at[i] = L::plus(self.at[i], self.step[i]);
             self.step[i] = L::plus(self.step[i], self.bend[i]);
-        }
-    }
-
-    #[inline(always)]
-    fn first_lane(&self) -> FirstLane {
-        FirstLane {
-            at: self.at.map(|v| L::first(v) as i32),
-            step: self.step.map(|v| L::first(v) as i32),
-            bend: self.bend.map(|v| L::first(v) as i32),
-        }
-    }
-}
-
-/// The first lane of a [`Column`].
-struct FirstLane {
-    at: [i32; 2],
-    step: [i32; 2],
-    bend: [i32; 2],
-}
-
-impl FirstLane {
-    #[inline(always)]
-    fn advance(&mut self) {
-        for i in 0..2 {
-            self.at[i] = self.at[i].wrapping_add(self.step[i]);
-            self.step[i] = self.step[i].wrapping_add(self.bend[i]);
         }
     }
 }

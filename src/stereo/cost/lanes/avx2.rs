@@ -229,11 +229,6 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
-    fn first(bits: Bits) -> u32 {
-        unsafe { _mm256_cvtsi256_si32(bits.0) as u32 }
-    }
-
-    #[inline(always)]
     fn bilinear(quad: Bits, column: Bits, row: Bits) -> Bits {
         (bilinear8(quad.0, column.0, row.0), bilinear8(quad.1, column.1, row.1))
     }

@@ -187,10 +187,7 @@ impl Lanes for One {
 
     #[inline(always)]
     fn place(column: __m512i, row: __m512i, width: u32) -> __m512i {
-        unsafe {
-            let both = _mm512_mask_blend_epi16(0xAAAA_AAAA, _mm512_srli_epi32::<16>(column), row);
-            _mm512_madd_epi16(both, Self::whole(1 | width << 16))
-        }
+        unsafe { _mm512_madd_epi16(Self::paired(column, row), Self::whole(1 | width << 16)) }
     }
 
     #[inline(always)]
@@ -201,25 +198,27 @@ impl Lanes for One {
         unsafe { _mm512_i32gather_epi32::<4>(_mm512_min_epu32(index, last), memory.as_ptr().cast()) }
     }
 
-    #[inline(always)]
-    fn first(bits: __m512i) -> u32 {
-        unsafe { _mm512_cvtsi512_si32(bits) as u32 }
-    }
-
     const LOOKUP: bool = true;
 
     #[inline(always)]
-    fn lookup<const ROWS: usize>(memory: &[u8], stride: usize, column: __m512i, row: __m512i) -> __m512i {
+    fn lookup<const ROWS: usize>(
+        memory: &[u8],
+        first: usize,
+        stride: usize,
+        column: __m512i,
+        row: __m512i,
+    ) -> __m512i {
         let index = unsafe {
             let both = _mm512_and_si512(_mm512_srli_epi32::<12>(row), Self::whole(0x70));
             let both = _mm512_or_si512(both, _mm512_srli_epi32::<16>(column));
             let lane = _mm512_set4_epi32(0x0c0c_0c0c, 0x0808_0808, 0x0404_0404, 0);
             _mm512_add_epi8(_mm512_shuffle_epi8(both, lane), Self::whole(0x1110_0100))
         };
-        let Some(all) = memory.get(..(ROWS - 1) * stride + 16) else { return column };
-        // SAFETY: every row of sixteen bytes is within `all`.
+        let Some(last) = memory.len().checked_sub((ROWS - 1) * stride + 16) else { return column };
+        // SAFETY: from the minimum on, `memory` holds all rows of sixteen bytes.
         unsafe {
-            let row = |k: usize| _mm_loadu_si128(all.as_ptr().add(k * stride).cast());
+            let first = memory.as_ptr().add(first.min(last));
+            let row = |k: usize| _mm_loadu_si128(first.add(k * stride).cast());
             let four = |k: usize| {
                 let low = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(row(k)), row(k + 1));
                 let high = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(row(k + 2)), row(k + 3));
@@ -247,7 +246,7 @@ impl Lanes for One {
 
     #[inline(always)]
     fn paired(low: __m512i, high: __m512i) -> __m512i {
-        unsafe { _mm512_mask_blend_epi16(0xAAAA_AAAA, _mm512_srli_epi32::<16>(low), high) }
+        unsafe { _mm512_or_si512(_mm512_srli_epi32::<16>(low), Self::masked(high, 0xffff_0000)) }
     }
 }
 

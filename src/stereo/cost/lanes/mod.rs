@@ -92,14 +92,13 @@ pub(crate) trait Lanes:
     fn gather(memory: &[u32], index: Self::Bits) -> Self::Bits;
     /// Whether [`Lanes::lookup`] is there, and faster than [`Lanes::gather`].
     const LOOKUP: bool = false;
-    /// The first lane.
-    fn first(bits: Self::Bits) -> u32;
     /// The bytes at the whole parts of fixed-point columns and rows, at the next column, and at both in the next row:
-    /// as packed in words for [`Lanes::bilinear`]. `ROWS` (4 or 8) rows of sixteen bytes, `stride` apart, start at the
-    /// first byte of `memory`; all columns are below 15 and all rows below `ROWS` − 1, and memory holds all rows.
+    /// as packed in words for [`Lanes::bilinear`]. `ROWS` (4 or 8) rows of sixteen bytes, `stride` apart, start at byte
+    /// `first` of `memory`; all columns are below 15 and all rows below `ROWS` − 1, and memory holds all rows.
     #[inline(always)]
     fn lookup<const ROWS: usize>(
         _memory: &[u8],
+        _first: usize,
         _stride: usize,
         column: Self::Bits,
         _row: Self::Bits,

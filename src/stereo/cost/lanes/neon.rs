@@ -209,11 +209,6 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
-    fn first(bits: Bits) -> u32 {
-        unsafe { vgetq_lane_u32::<0>(bits[0]) }
-    }
-
-    #[inline(always)]
     fn bilinear(quad: Bits, column: Bits, row: Bits) -> Bits {
         each!(I => bilinear4(quad[I], column[I], row[I]))
     }

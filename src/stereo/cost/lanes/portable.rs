@@ -183,11 +183,6 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn first(bits: [u32; 16]) -> u32 {
-        bits[0]
-    }
-
-    #[inline(always)]
     fn bilinear(quad: [u32; 16], column: [u32; 16], row: [u32; 16]) -> [u32; 16] {
         from_fn(|i| {
             let [a, b, c, d] = quad[i].to_le_bytes().map(|v| i32::from(v as i8));

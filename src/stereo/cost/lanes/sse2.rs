@@ -207,11 +207,6 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
-    fn first(bits: Bits) -> u32 {
-        unsafe { _mm_cvtsi128_si32(bits[0]) as u32 }
-    }
-
-    #[inline(always)]
     fn bilinear(quad: Bits, column: Bits, row: Bits) -> Bits {
         each!(I => bilinear4(quad[I], column[I], row[I]))
     }

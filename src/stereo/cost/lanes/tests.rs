@@ -113,9 +113,9 @@ fn assert_lookup_gathers<L: Lanes>() {
         });
         let (column, row) = (L::load_words(&column), L::load_words(&row));
         let got = if height == 4 {
-            L::lookup::<4>(&bytes, STRIDE, column, row)
+            L::lookup::<4>(&bytes, 0, STRIDE, column, row)
         } else {
-            L::lookup::<8>(&bytes, STRIDE, column, row)
+            L::lookup::<8>(&bytes, 0, STRIDE, column, row)
         };
         let mut stored = [0; 16];
         L::store_words(got, &mut stored);
