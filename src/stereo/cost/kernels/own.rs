@@ -3,7 +3,7 @@
 use super::correlation::{SumRows, finish, merged, of_samples};
 use super::geometric::geometric_term;
 use super::label::label_term;
-use super::warp::{FIXED, MIN_DEPTH_RATIO, clamped, texels};
+use super::warp::{FIXED, MIN_DEPTH_RATIO, SMOOTH, clamped, texels};
 use super::{LANE, Lanes};
 use crate::stereo::level::{Level, Source};
 use crate::stereo::tile::{
@@ -45,32 +45,26 @@ pub(in crate::stereo::cost) fn score_own<L: Lanes>(tile: &mut Tile, level: &Leve
 fn of_row<L: Lanes>(patch: &Patch, source: &Source, at: (f32, f32), planes: [L; 3], y: usize) -> L {
     let warps = WarpRow::new(source, at, planes);
     let inside = warps.inside(source);
-    let sums = match L::all(inside) {
-        true => correlated::<L, true>(patch, source, &warps, y),
-        false => correlated::<L, false>(patch, source, &warps, y),
+    let sums = match L::all(L::both(inside, warps.nearly_quadratic())) {
+        true => smooth::<L>(patch, source, &warps, y),
+        false => correlated::<L>(patch, source, &warps, y),
     };
     L::select(inside, finish::<L>(patch, y, &sums), L::splat(ROBUST_COST))
 }
 
-/// Sums over the windows of row `y`; unless they are all `INSIDE` the source, samples are clamped.
+/// Sums over the windows of row `y`; samples are clamped.
 #[inline(always)]
-fn correlated<L: Lanes, const INSIDE: bool>(
-    patch: &Patch,
-    source: &Source,
-    warps: &WarpRow<L>,
-    y: usize,
-) -> SumRows {
-    let centre = sample::<L, INSIDE>(source, warps, 2, 2);
-    let shift = L::negated(centre);
+fn correlated<L: Lanes>(patch: &Patch, source: &Source, warps: &WarpRow<L>, y: usize) -> SumRows {
+    let shift = L::negated(sample::<L>(source, warps, 2, 2));
     let mut samples = [[0; TILE_W]; TAPS];
     for (tap, samples) in samples.iter_mut().enumerate() {
         let (i, j) = (tap / TAP_COLUMNS, tap % TAP_COLUMNS);
         let below = if i + 1 < TAP_ROWS {
-            L::plus(sample::<L, INSIDE>(source, warps, 2 * i + 1, j), shift)
+            L::plus(sample::<L>(source, warps, 2 * i + 1, j), shift)
         } else {
             L::whole(0)
         };
-        let here = L::plus(sample::<L, INSIDE>(source, warps, 2 * i, j), shift);
+        let here = L::plus(sample::<L>(source, warps, 2 * i, j), shift);
         L::store_words(L::paired(here, below), samples);
     }
     of_samples::<L>(patch, y, &samples)
@@ -78,12 +72,72 @@ fn correlated<L: Lanes, const INSIDE: bool>(
 
 /// Samples of row `i`, column `j` of the matching windows.
 #[inline(always)]
-fn sample<L: Lanes, const INSIDE: bool>(source: &Source, warps: &WarpRow<L>, i: usize, j: usize) -> L::Bits {
-    let (mut u, mut v) = warps.near((2 * j) as f32 - REACH as f32, (2 * i) as f32 - REACH as f32);
-    if !INSIDE {
-        (u, v, _) = clamped(source, u, v);
-    }
+fn sample<L: Lanes>(source: &Source, warps: &WarpRow<L>, i: usize, j: usize) -> L::Bits {
+    let (u, v) = warps.near((2 * j) as f32 - REACH as f32, (2 * i) as f32 - REACH as f32);
+    let (u, v, _) = clamped(source, u, v);
     texels::<L>(source, u.truncated(), v.truncated())
+}
+
+/// Sums over the windows of row `y`, which are inside the source, by warps that are quadratic in the offset.
+#[inline(always)]
+fn smooth<L: Lanes>(patch: &Patch, source: &Source, warps: &WarpRow<L>, y: usize) -> SumRows {
+    let [u, v] = warps.centre;
+    let shift = L::negated(texels::<L>(source, u.truncated(), v.truncated()));
+    let mut samples = [[0; TILE_W]; TAPS];
+    for (i, samples) in samples.chunks_exact_mut(TAP_COLUMNS).enumerate() {
+        let mut upper = TapRow::new(warps, 2 * i);
+        let mut lower = TapRow::new(warps, 2 * i + 1);
+        for samples in samples {
+            let here = L::plus(texels::<L>(source, upper.at[0], upper.at[1]), shift);
+            upper.advance();
+            let below = if i + 1 < TAP_ROWS {
+                L::plus(texels::<L>(source, lower.at[0], lower.at[1]), shift)
+            } else {
+                L::whole(0)
+            };
+            lower.advance();
+            L::store_words(L::paired(here, below), samples);
+        }
+    }
+    of_samples::<L>(patch, y, &samples)
+}
+
+/// Source pixels, in fixed point, of a row of the matching windows, tap after tap, by second differences.
+struct TapRow<L: Lanes> {
+    at: [L::Bits; 2],
+    step: [L::Bits; 2],
+    bend: [L::Bits; 2],
+}
+
+impl<L: Lanes> TapRow<L> {
+    #[inline(always)]
+    fn new(warps: &WarpRow<L>, i: usize) -> Self {
+        let oy = (2 * i) as f32 - REACH as f32;
+        let [u, v] = [Self::coordinate(warps, 0, oy), Self::coordinate(warps, 1, oy)];
+        TapRow { at: [u[0], v[0]], step: [u[1], v[1]], bend: [u[2], v[2]] }
+    }
+
+    /// `centre + (ox·dx + oy·dy)·(1 − e)` at the first tap, and its differences.
+    #[inline(always)]
+    fn coordinate(warps: &WarpRow<L>, k: usize, oy: f32) -> [L::Bits; 3] {
+        let (dx, dy) = (warps.d_dx[k], warps.d_dy[k]);
+        let (first, oy, two) = (L::splat(-(REACH as f32)), L::splat(oy), L::splat(2.0));
+        let e = first * warps.z_dx + oy * warps.z_dy;
+        let straight = first * dx + oy * dy;
+        let at = warps.centre[k] + straight * (L::splat(1.0) - e);
+        // (ox + 2, e + 2 z_dx) less (ox, e): 2 dx (1 − e) − 2 z_dx (straight + 2 dx).
+        let step = two * (dx * (L::splat(1.0) - e) - warps.z_dx * (straight + two * dx));
+        let bend = L::splat(-8.0) * dx * warps.z_dx;
+        [at.truncated(), step.truncated(), bend.truncated()]
+    }
+
+    #[inline(always)]
+    fn advance(&mut self) {
+        for k in 0..2 {
+            self.at[k] = L::plus(self.at[k], self.step[k]);
+            self.step[k] = L::plus(self.step[k], self.bend[k]);
+        }
+    }
 }
 
 /// The homographies of a row of pixels, each anchored at its pixel: source pixel, in fixed point, of an offset `(ox, oy)` is
@@ -130,6 +184,12 @@ impl<L: Lanes> WarpRow<L> {
         let r = L::splat(1.0) / z;
         let (u, v) = self.along(ox, oy, r);
         (u, v, z)
+    }
+
+    /// Where the depth ratio hardly changes within the matching window.
+    #[inline(always)]
+    fn nearly_quadratic(&self) -> L::Mask {
+        ((self.z_dx.abs() + self.z_dy.abs()) * L::splat(REACH as f32)).lt(L::splat(SMOOTH))
     }
 
     /// Source pixels of an offset within the matching window, where 1 / z is 1 − e + e² for any usable plane.

@@ -11,7 +11,7 @@ pub(super) const MIN_DEPTH_RATIO: f32 = 0.3;
 const HALF: (f32, f32) = ((WIN_W as f32 - 1.0) / 2.0, (WIN_H as f32 - 1.0) / 2.0);
 /// Change of the depth ratio within the window up to which a warp is quadratic: the error, in pixels, is below a window's
 /// half extent times the square of this.
-const SMOOTH: f32 = 0.03;
+pub(super) const SMOOTH: f32 = 0.03;
 /// Steps per pixel of fixed-point source pixels.
 pub(super) const FIXED: f32 = 65_536.0;
 /// Added to the extent of footprints for rounding, in pixels.
