@@ -92,7 +92,7 @@ pub(crate) struct Halo {
     pub(crate) nz: HaloMap,
     /// Inverse depth.
     pub(crate) w: HaloMap,
-    /// 1 where there is an estimate, else 0.
+    /// 1 where there may be an estimate, else 0.
     pub(crate) on: HaloMap,
     /// One over the lengths that the vectors of the tile's own pixels had.
     pub(crate) inverse_length: TileMap,

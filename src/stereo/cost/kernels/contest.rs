@@ -1,6 +1,7 @@
 //! The contest: which pixels a candidate wins.
 
 use super::correlation::merged;
+use super::smoothness::PlaneVector;
 use super::{LANE, Lanes};
 use crate::stereo::plane::InversePlane;
 use crate::stereo::tile::{CENTRE, ROBUST_COST, TILE_H, Tile};
@@ -19,8 +20,13 @@ pub(super) fn total<L: Lanes>(data: L, smooth: L, w: L, prior: (L, L)) -> L {
 
 /// Gives the candidate to every pixel for which its total cost is lower. One bit per row that changed.
 #[inline(always)]
-pub(super) fn accept<L: Lanes>(tile: &mut Tile, p: InversePlane, low: f32, high: f32) -> u32 {
-    let Tile { belief, scratch, .. } = tile;
+pub(super) fn accept<L: Lanes>(
+    tile: &mut Tile,
+    p: InversePlane,
+    vector: PlaneVector,
+    (low, high): (f32, f32),
+) -> u32 {
+    let Tile { belief, halo, scratch, .. } = tile;
     let mut changed = 0;
     let along = L::splat(p.wx) * (L::load(&LANE) - L::splat(CENTRE.0));
     for y in 0..TILE_H {
@@ -33,6 +39,7 @@ pub(super) fn accept<L: Lanes>(tile: &mut Tile, p: InversePlane, low: f32, high:
         let better = L::both(t.lt(old), L::both(possible, L::splat(0.5).lt(L::load(&belief.active[y]))));
         if L::any(better) {
             changed |= 1 << y;
+            vector.take(halo, y, w, better);
             L::select(better, t, old).store(&mut belief.total[y]);
             for (row, new) in [
                 (&mut belief.data[y], data),

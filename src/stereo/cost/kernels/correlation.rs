@@ -69,15 +69,24 @@ fn window_rows<P: Pairs, const X: usize, const G: usize>(
 ) {
     let row = (first + 4 * G) % WIN_H;
     let [upper, lower] = sums;
+    let mut weighted = [[P::splat(0); TAP_COLUMNS]; 2];
     for j in 0..TAP_COLUMNS {
         let v = P::load(&warped[row], X + 2 * j);
         let t = P::load(&patch.pairs[row], X + 2 * j);
         if G < TAP_ROWS {
-            add(upper, v, t, P::load(&patch.weight[first % TILE_H][TAP_COLUMNS * G + j], X));
+            let weight = P::load(&patch.weight[first % TILE_H][TAP_COLUMNS * G + j], X);
+            weighted[0][j] = add_products(upper, v, t, weight);
         }
         if G > 0 {
-            add(lower, v, t, P::load(&patch.weight[(first + 4) % TILE_H][TAP_COLUMNS * (G - 1) + j], X));
+            let weight = P::load(&patch.weight[(first + 4) % TILE_H][TAP_COLUMNS * (G - 1) + j], X);
+            weighted[1][j] = add_products(lower, v, t, weight);
         }
+    }
+    if G < TAP_ROWS {
+        add(upper, weighted[0]);
+    }
+    if G > 0 {
+        add(lower, weighted[1]);
     }
 }
 
@@ -87,10 +96,14 @@ pub(super) fn of_samples<L: Lanes>(patch: &Patch, y: usize, samples: &[Words; TA
     let mut out = [[0; TILE_W]; 3];
     for x in (0..TILE_W).step_by(L::Pairs::WIDTH) {
         let mut sums = [L::Pairs::splat(0); 3];
-        for (tap, samples) in samples.iter().enumerate() {
-            let (i, j) = (tap / TAP_COLUMNS, tap % TAP_COLUMNS);
-            let t = L::Pairs::load(&patch.pairs[y + 4 * i], x + 2 * j);
-            add(&mut sums, L::Pairs::load(samples, x), t, L::Pairs::load(&patch.weight[y][tap], x));
+        for (i, samples) in samples.chunks_exact(TAP_COLUMNS).enumerate() {
+            let mut weighted = [L::Pairs::splat(0); TAP_COLUMNS];
+            for (j, samples) in samples.iter().enumerate() {
+                let t = L::Pairs::load(&patch.pairs[y + 4 * i], x + 2 * j);
+                let weight = L::Pairs::load(&patch.weight[y][TAP_COLUMNS * i + j], x);
+                weighted[j] = add_products(&mut sums, L::Pairs::load(samples, x), t, weight);
+            }
+            add(&mut sums, weighted);
         }
         for (sum, to) in sums.into_iter().zip(&mut out) {
             sum.store(to, x);
@@ -99,14 +112,23 @@ pub(super) fn of_samples<L: Lanes>(patch: &Patch, y: usize, samples: &[Words; TA
     out
 }
 
-/// Adds pairs of texels of source and reference with their weights.
+/// Adds the products of pairs of texels of source and reference with their weights. Returns weighted source texels.
 #[inline(always)]
-fn add<P: Pairs>(sums: &mut Sums<P>, source: P, reference: P, weight: P) {
+fn add_products<P: Pairs>(sums: &mut Sums<P>, source: P, reference: P, weight: P) -> P {
     let weighted = weight.scaled(source);
-    sums[0] = sums[0].plus_dot(weighted, P::splat(0x0001_0001));
     sums[1] = sums[1].plus_dot(weighted, source);
     sums[2] = sums[2].plus_dot(weighted, reference);
+    weighted
 }
+
+/// Adds pairs of weighted source texels. Differences of grey levels are below 255: four of them fit 16 bits.
+#[inline(always)]
+fn add<P: Pairs>(sums: &mut Sums<P>, [a, b, c, d, e]: [P; TAP_COLUMNS]) {
+    let ones = P::splat(0x0001_0001);
+    sums[0] = sums[0].plus_dot(a.plus(b).plus(c.plus(d)), ones).plus_dot(e, ones);
+}
+
+const _: () = assert!(4.0 * 255.0 * SAMPLES < i16::MAX as f32);
 
 /// Cost from the weighted sums of row `y`.
 #[inline(always)]
@@ -119,8 +141,7 @@ pub(super) fn finish<L: Lanes>(patch: &Patch, y: usize, [sum, square, cross]: &S
     let covariance = cross - L::load(&patch.mean[y]) * sum;
     let product = norm * L::load(&patch.norm[y]);
     let flat = L::splat(FLAT);
-    let correlation = (covariance * product.max(flat).inverse_sqrt()).min(L::splat(1.0));
-    let cost = (L::splat(1.0) - correlation).min(L::splat(2.0));
+    let cost = (L::splat(1.0) - covariance * product.inverse_sqrt()).max(L::splat(0.0));
     let textured = L::both(flat.lt(product), (mean.abs() * L::splat(ROUNDING)).lt(norm));
     L::select(textured, cost, L::splat(ROBUST_COST))
 }

@@ -23,9 +23,9 @@ pub(super) fn label_term<L: Lanes>(
     let (u, v) = (projected(source, 0, column, y, w) * r, projected(source, 1, column, y, w) * r);
     let ku = zero.max(u).min(L::splat(source.width as f32 - 1.0));
     let kv = zero.max(v).min(L::splat(source.height as f32 - 1.0));
-    let inside = L::both(((ku - u).abs() + (kv - v).abs()).le(zero), near.lt(z));
-    let (_, iu) = (ku + half).fraction_and_whole();
-    let (_, iv) = (kv + half).fraction_and_whole();
+    let inside = L::both(L::both(ku.eq(u), kv.eq(v)), near.lt(z));
+    let (_, iu) = ku.nearest();
+    let (_, iv) = kv.nearest();
     let there = L::from_whole(L::gather(labels, L::row_major(iu, iv, source.width)));
     let here = L::from_whole(L::load_words(&classes[row]));
     let classed = L::both(half.lt(there), half.lt(here));

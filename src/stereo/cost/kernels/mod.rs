@@ -19,6 +19,7 @@ use crate::stereo::plane::InversePlane;
 use crate::stereo::tile::{CENTRE, REACH, ROBUST_COST, Row, TILE_H, TILE_W, Tile, TileMap, UNSEEN, WinRow};
 use geometric::geometric_term;
 use label::label_term;
+use smoothness::PlaneVector;
 use warp::{Coverage, warp};
 
 const ZERO: Row = [0.0; TILE_W];
@@ -40,12 +41,13 @@ pub(super) fn try_plane<L: Lanes>(tile: &mut Tile, level: &Level, plane: Inverse
     if !thinkable {
         return false;
     }
-    smoothness::of_candidate::<L>(tile, level, plane);
+    let vector = PlaneVector::new(tile, level, plane);
+    smoothness::of_candidate::<L>(tile, plane, vector);
     if !data_cost::<L>(tile, level, plane) {
         return false;
     }
-    let changed = contest::accept::<L>(tile, plane, low, high);
-    smoothness::refresh::<L>(tile, level, changed);
+    let changed = contest::accept::<L>(tile, plane, vector, (low, high));
+    smoothness::refresh::<L>(tile, changed);
     changed != 0
 }
 

@@ -4,7 +4,7 @@ use super::contest::total;
 use super::{LANE, Lanes, cut};
 use crate::stereo::level::Level;
 use crate::stereo::plane::{InversePlane, Pinhole};
-use crate::stereo::tile::{CENTRE, Row, TILE_H, TILE_W, Tile};
+use crate::stereo::tile::{CENTRE, Halo, Row, TILE_H, TILE_W, Tile};
 
 /// 1 / (2 · 0.02²): relative distance from a neighbour's point to the plane.
 const DEPTH: f32 = 1250.0;
@@ -12,42 +12,76 @@ const DEPTH: f32 = 1250.0;
 const NORMAL: f32 = 9.71;
 const DEPTH_BONUS: f32 = 0.07;
 const NORMAL_BONUS: f32 = 0.0672;
+/// Inverse depth where there is no estimate: far from all others. The unit vector there is zero, at a right angle to all.
+const NOWHERE: f32 = 1e18;
 
-/// A row of planes as unit vectors and inverse depths; `on` is 1 where there is an estimate, else 0.
+/// A row of planes as unit vectors and inverse depths.
 #[derive(Clone, Copy)]
 struct Planes<L> {
     unit: [L; 3],
     w: L,
-    on: L,
 }
 
 /// Smoothness factor between planes with `unit` vectors, once `1 / inverse_length` long, and inverse depths `w` at a
 /// neighbouring pixel, and that neighbour's own plane: below 1 where they agree.
 #[inline(always)]
 fn agreement<L: Lanes>(unit: [L; 3], inverse_length: L, w: L, there: Planes<L>) -> L {
-    let (one, zero) = (L::splat(1.0), L::splat(0.0));
+    let one = L::splat(1.0);
     let r = (w - there.w) * inverse_length;
-    let near = L::bell8(r * r * L::splat(DEPTH));
+    let near = L::bell(r * r * L::splat(DEPTH / 8.0));
     let cos = unit[0] * there.unit[0] + unit[1] * there.unit[1] + unit[2] * there.unit[2];
-    let o = (one - cos).max(zero);
-    let angle2 = o + o + o * o * L::splat(1.0 / 3.0);
-    let parallel = L::bell8(angle2 * L::splat(NORMAL));
-    (one - there.on * L::splat(DEPTH_BONUS) * near) * (one - there.on * L::splat(NORMAL_BONUS) * parallel)
+    let o = one - cos;
+    // the angle's square is 2 o + o² / 3
+    let parallel = L::bell(o * (o * L::splat(NORMAL / 24.0) + L::splat(NORMAL / 4.0)));
+    (one - L::splat(DEPTH_BONUS) * near) * (one - L::splat(NORMAL_BONUS) * parallel)
+}
+
+/// The vector of a plane.
+#[derive(Clone, Copy)]
+pub(super) struct PlaneVector {
+    /// Of unit length.
+    unit: [f32; 3],
+    /// One over the length that it had.
+    inverse_length: f32,
+}
+
+impl PlaneVector {
+    /// Of a plane anchored at the tile's centre.
+    #[inline(always)]
+    pub(super) fn new(tile: &Tile, level: &Level, p: InversePlane) -> Self {
+        let m = level.pinhole.plane_vector(p, tile.x0 as f32 + CENTRE.0, tile.y0 as f32 + CENTRE.1);
+        let inverse_length = 1.0 / (m[0] * m[0] + m[1] * m[1] + m[2] * m[2]).sqrt().max(1e-30);
+        PlaneVector { unit: m.map(|v| v * inverse_length), inverse_length }
+    }
+
+    /// Gives it to pixels of row `y` of a tile.
+    #[inline(always)]
+    pub(super) fn take<L: Lanes>(self, halo: &mut Halo, y: usize, w: L, takers: L::Mask) {
+        let Halo { nx, ny, nz, w: depths, inverse_length, .. } = halo;
+        for (row, new) in [
+            (&mut nx[y + 1], L::splat(self.unit[0])),
+            (&mut ny[y + 1], L::splat(self.unit[1])),
+            (&mut nz[y + 1], L::splat(self.unit[2])),
+            (&mut depths[y + 1], w),
+        ] {
+            let old = cut(row, 1);
+            put(row, L::select(takers, new, old));
+        }
+        let row = &mut inverse_length[y];
+        L::select(takers, L::splat(self.inverse_length), L::load(row)).store(row);
+    }
 }
 
 /// What every pixel of the tile and its surround says about a candidate plane.
 #[inline(always)]
-pub(super) fn of_candidate<L: Lanes>(tile: &mut Tile, level: &Level, p: InversePlane) {
-    let Tile { x0, y0, halo, scratch, .. } = tile;
-    let m = level.pinhole.plane_vector(p, *x0 as f32 + CENTRE.0, *y0 as f32 + CENTRE.1);
-    let inverse_length = 1.0 / (m[0] * m[0] + m[1] * m[1] + m[2] * m[2]).sqrt().max(1e-30);
-    let (unit, inverse_length) = (m.map(|v| L::splat(v * inverse_length)), L::splat(inverse_length));
+pub(super) fn of_candidate<L: Lanes>(tile: &mut Tile, p: InversePlane, vector: PlaneVector) {
+    let Tile { halo, scratch, .. } = tile;
+    let (unit, inverse_length) = (vector.unit.map(L::splat), L::splat(vector.inverse_length));
     let (column, slope) = (L::load(&LANE) - L::splat(CENTRE.0), L::splat(p.wx));
     for y in 0..TILE_H + 2 {
         let there = Planes {
             unit: [cut(&halo.nx[y], 1), cut(&halo.ny[y], 1), cut(&halo.nz[y], 1)],
             w: cut(&halo.w[y], 1),
-            on: cut(&halo.on[y], 1),
         };
         let w = L::splat(p.w + p.wy * (y as f32 - 1.0 - CENTRE.1)) + slope * column;
         let mut out = [0.0; TILE_W];
@@ -55,11 +89,7 @@ pub(super) fn of_candidate<L: Lanes>(tile: &mut Tile, level: &Level, p: InverseP
         scratch.smooth[y][1..=TILE_W].copy_from_slice(&out);
     }
     let s = &halo.sides;
-    let there = Planes {
-        unit: [L::load(&s.nx), L::load(&s.ny), L::load(&s.nz)],
-        w: L::load(&s.w),
-        on: L::load(&s.on),
-    };
+    let there = Planes { unit: [L::load(&s.nx), L::load(&s.ny), L::load(&s.nz)], w: L::load(&s.w) };
     let w = L::splat(p.w) + slope * L::load(&SIDE_X) + L::splat(p.wy) * L::load(&SIDE_Y);
     let mut out = [0.0; TILE_W];
     agreement(unit, inverse_length, w, there).store(&mut out);
@@ -101,6 +131,20 @@ fn vectors<L: Lanes>(pinhole: &Pinhole, x: L, y: L, [w, wx, wy]: [L; 3]) -> ([L;
     ([m[0] * r, m[1] * r, m[2] * r], r)
 }
 
+/// Unit vectors and inverse depths of planes where they are `on`; elsewhere what agrees with nothing.
+#[inline(always)]
+fn known<L: Lanes>(unit: [L; 3], w: L, on: L) -> [L; 4] {
+    let (zero, half) = (L::splat(0.0), L::splat(0.5));
+    let known = L::both(zero.lt(w), half.lt(on));
+    let [x, y, z] = unit;
+    [
+        L::select(known, x, zero),
+        L::select(known, y, zero),
+        L::select(known, z, zero),
+        L::select(known, w, L::splat(NOWHERE)),
+    ]
+}
+
 /// Turns the surround's slopes into unit vectors, and computes every pixel's total cost.
 #[inline(always)]
 pub(in crate::stereo::cost) fn begin<L: Lanes>(tile: &mut Tile, level: &Level) {
@@ -111,30 +155,29 @@ pub(in crate::stereo::cost) fn begin<L: Lanes>(tile: &mut Tile, level: &Level) {
         let row = L::splat(y0 - 1.0 + y as f32);
         let planes: [L; 3] = [cut(&halo.w[y], 1), cut(&halo.nx[y], 1), cut(&halo.ny[y], 1)];
         let (unit, r) = vectors(&level.pinhole, column, row, planes);
-        for (to, unit) in [&mut halo.nx, &mut halo.ny, &mut halo.nz].into_iter().zip(unit) {
-            put(&mut to[y], unit);
+        let fields = [&mut halo.nx, &mut halo.ny, &mut halo.nz, &mut halo.w];
+        for (to, field) in fields.into_iter().zip(known(unit, planes[0], cut(&halo.on[y], 1))) {
+            put(&mut to[y], field);
         }
         if let Some(to) = y.checked_sub(1).and_then(|y| halo.inverse_length.get_mut(y)) {
             r.store(to);
         }
-        let known = L::select(L::splat(0.0).lt(planes[0]), cut(&halo.on[y], 1), L::splat(0.0));
-        put(&mut halo.on[y], known);
     }
     let s = &mut halo.sides;
     let planes = [L::load(&s.w), L::load(&s.nx), L::load(&s.ny)];
     let x = L::splat(x0 + CENTRE.0) + L::load(&SIDE_X);
     let y = L::splat(y0 + CENTRE.1) + L::load(&SIDE_Y);
     let (unit, _) = vectors(&level.pinhole, x, y, planes);
-    for (to, unit) in [&mut s.nx, &mut s.ny, &mut s.nz].into_iter().zip(unit) {
-        unit.store(to);
+    let fields = [&mut s.nx, &mut s.ny, &mut s.nz, &mut s.w];
+    for (to, field) in fields.into_iter().zip(known(unit, planes[0], L::load(&s.on))) {
+        field.store(to);
     }
-    L::select(L::splat(0.0).lt(planes[0]), L::load(&s.on), L::splat(0.0)).store(&mut s.on);
     for y in 0..TILE_H {
         for (x, side) in [(0, y), (TILE_W + 1, TILE_H + y)] {
             halo.nx[y + 1][x] = s.nx[side];
             halo.ny[y + 1][x] = s.ny[side];
             halo.nz[y + 1][x] = s.nz[side];
-            halo.on[y + 1][x] = s.on[side];
+            halo.w[y + 1][x] = s.w[side];
         }
     }
     for y in 0..TILE_H {
@@ -152,21 +195,9 @@ fn put<L: Lanes>(row: &mut [f32], lanes: L) {
     }
 }
 
-/// Brings vectors, agreements and totals up to date after pixels of the `changed` rows have taken another plane.
+/// Brings agreements and totals up to date after pixels of the `changed` rows have taken another plane.
 #[inline(always)]
-pub(super) fn refresh<L: Lanes>(tile: &mut Tile, level: &Level, changed: u32) {
-    let column = L::splat(tile.x0 as f32) + L::load(&LANE);
-    for y in (0..TILE_H).filter(|y| changed >> y & 1 != 0) {
-        let (halo, belief) = (&mut tile.halo, &tile.belief);
-        let row = L::splat((tile.y0 + y as i32) as f32);
-        let planes = [L::load(&belief.w[y]), L::load(&belief.wx[y]), L::load(&belief.wy[y])];
-        let (unit, r) = vectors(&level.pinhole, column, row, planes);
-        for (to, unit) in [&mut halo.nx, &mut halo.ny, &mut halo.nz].into_iter().zip(unit) {
-            put(&mut to[y + 1], unit);
-        }
-        r.store(&mut halo.inverse_length[y]);
-        put(&mut halo.w[y + 1], planes[0]);
-    }
+pub(super) fn refresh<L: Lanes>(tile: &mut Tile, changed: u32) {
     let (below, above) = (changed | changed << 1, changed | changed >> 1);
     for y in (0..TILE_H).filter(|y| (below | above) >> y & 1 != 0) {
         if changed >> y & 1 != 0 {
@@ -218,11 +249,7 @@ fn own<L: Lanes>(tile: &Tile, y: usize) -> ([L; 3], L) {
 #[inline(always)]
 fn there<L: Lanes>(tile: &Tile, y: usize, x: usize) -> Planes<L> {
     let halo = &tile.halo;
-    Planes {
-        unit: [cut(&halo.nx[y], x), cut(&halo.ny[y], x), cut(&halo.nz[y], x)],
-        w: cut(&halo.w[y], x),
-        on: cut(&halo.on[y], x),
-    }
+    Planes { unit: [cut(&halo.nx[y], x), cut(&halo.ny[y], x), cut(&halo.nz[y], x)], w: cut(&halo.w[y], x) }
 }
 
 /// Total cost of row `y`: every pixel's own plane against its four neighbours.

@@ -403,8 +403,7 @@ pub(super) fn clamped<L: Lanes>(source: &Source, u: L, v: L) -> (L, L, L::Mask) 
     let one = L::splat(FIXED);
     let ku = one.max(u).min(L::splat((source.width as f32 - 2.0) * FIXED));
     let kv = one.max(v).min(L::splat((source.height as f32 - 2.0) * FIXED));
-    let off = (ku - u).abs() + (kv - v).abs();
-    (ku, kv, off.le(L::splat(0.0)))
+    (ku, kv, L::both(ku.eq(u), kv.eq(v)))
 }
 
 /// Bilinear samples of the source at fixed-point pixels, in the high halves: about 1/64 grey levels from mid-grey.

@@ -95,6 +95,13 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
+    fn eq(self, other: Self) -> (__m256, __m256) {
+        unsafe {
+            (_mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, other.0), _mm256_cmp_ps::<_CMP_EQ_OQ>(self.1, other.1))
+        }
+    }
+
+    #[inline(always)]
     fn both(a: (__m256, __m256), b: (__m256, __m256)) -> (__m256, __m256) {
         unsafe { (_mm256_and_ps(a.0, b.0), _mm256_and_ps(a.1, b.1)) }
     }
@@ -272,6 +279,11 @@ impl Pairs for EightPairs {
     #[inline(always)]
     fn scaled(self, b: Self) -> Self {
         EightPairs(unsafe { _mm256_mulhrs_epi16(self.0, b.0) })
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        EightPairs(unsafe { _mm256_add_epi16(self.0, other.0) })
     }
 
     #[inline(always)]

@@ -79,6 +79,11 @@ impl Lanes for One {
     }
 
     #[inline(always)]
+    fn eq(self, other: Self) -> __mmask16 {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, other.0) }
+    }
+
+    #[inline(always)]
     fn both(a: __mmask16, b: __mmask16) -> __mmask16 {
         a & b
     }
@@ -280,6 +285,11 @@ impl Pairs for SixteenPairs {
     #[inline(always)]
     fn scaled(self, b: Self) -> Self {
         SixteenPairs(unsafe { _mm512_mulhrs_epi16(self.0, b.0) })
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        SixteenPairs(unsafe { _mm512_add_epi16(self.0, other.0) })
     }
 
     #[inline(always)]

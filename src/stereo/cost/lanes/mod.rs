@@ -32,6 +32,8 @@ pub(crate) trait Pairs: Copy {
     fn store(self, row: &mut Words, at: usize);
     /// Products of halves over 2¹⁵, rounded to the nearest; `b` has at most 14 bits.
     fn scaled(self, b: Self) -> Self;
+    /// Sums of halves modulo 2¹⁶.
+    fn plus(self, other: Self) -> Self;
     /// Adds the products of the low halves and of the high halves.
     fn plus_dot(self, a: Self, b: Self) -> Self;
 }
@@ -57,6 +59,7 @@ pub(crate) trait Lanes:
     fn abs(self) -> Self;
     fn lt(self, other: Self) -> Self::Mask;
     fn le(self, other: Self) -> Self::Mask;
+    fn eq(self, other: Self) -> Self::Mask;
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     fn any(mask: Self::Mask) -> bool;
     fn all(mask: Self::Mask) -> bool;
@@ -118,15 +121,15 @@ pub(crate) trait Lanes:
         row.iter().sum()
     }
 
-    /// Splits lanes in 0.5..2²² into a whole number, in the low bits of the second result, and the fraction above it;
-    /// the fraction is in 0..=1.
+    /// The nearest whole numbers of lanes in 0..2²², in the low bits of the second result, and what lanes are above them:
+    /// −0.5..=0.5.
     #[inline(always)]
-    fn fraction_and_whole(self) -> (Self, Self::Bits) {
-        let shifted = (self - Self::splat(0.5)) + Self::splat(MAGIC);
+    fn nearest(self) -> (Self, Self::Bits) {
+        let shifted = self + Self::splat(MAGIC);
         (self - (shifted - Self::splat(MAGIC)), shifted.to_bits())
     }
 
-    /// `row · width + column` of whole numbers below 2¹⁵ from [`Lanes::fraction_and_whole`].
+    /// `row · width + column` of whole numbers below 2¹⁵ from [`Lanes::nearest`].
     #[inline(always)]
     fn row_major(column: Self::Bits, row: Self::Bits, width: usize) -> Self::Bits {
         Self::place(Self::shifted_left::<16>(column), Self::shifted_left::<16>(row), width as u32)
@@ -144,10 +147,10 @@ pub(crate) trait Lanes:
         y * (Self::splat(1.5) - half * y * y)
     }
 
-    /// A bell of unit height: close to e⁻ˣ for x ≥ 0, and 0 from x = 8 on.
+    /// A bell of unit height: close to e⁻⁸ˣ for x ≥ 0, and 0 from x = 1 on.
     #[inline(always)]
-    fn bell8(x: Self) -> Self {
-        let b = (Self::splat(1.0) - x * Self::splat(1.0 / 8.0)).max(Self::splat(0.0));
+    fn bell(x: Self) -> Self {
+        let b = (Self::splat(1.0) - x).max(Self::splat(0.0));
         let b = b * b;
         let b = b * b;
         b * b

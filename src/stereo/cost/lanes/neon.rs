@@ -96,6 +96,11 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
+    fn eq(self, other: Self) -> Bits {
+        each!(I => vceqq_f32(self.0[I], other.0[I]))
+    }
+
+    #[inline(always)]
     fn both(a: Bits, b: Bits) -> Bits {
         each!(I => vandq_u32(a[I], b[I]))
     }
@@ -285,6 +290,11 @@ impl Pairs for FourPairs {
     #[inline(always)]
     fn scaled(self, b: Self) -> Self {
         FourPairs(unsafe { vqrdmulhq_s16(self.0, b.0) })
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        FourPairs(unsafe { vaddq_s16(self.0, other.0) })
     }
 
     #[inline(always)]

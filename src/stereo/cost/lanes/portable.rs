@@ -80,6 +80,11 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
+    fn eq(self, other: Self) -> [u32; 16] {
+        from_fn(|i| u32::from(self.0[i] == other.0[i]).wrapping_neg())
+    }
+
+    #[inline(always)]
     fn both(a: [u32; 16], b: [u32; 16]) -> [u32; 16] {
         from_fn(|i| a[i] & b[i])
     }
@@ -227,6 +232,15 @@ impl Pairs for FourPairs {
         FourPairs(from_fn(|i| {
             let low = (low_half(self.0[i]) * low_half(b.0[i]) + 0x4000) >> 15;
             let high = (high_half(self.0[i]) * high_half(b.0[i]) + 0x4000) >> 15;
+            low as u32 & 0xffff | (high as u32) << 16
+        }))
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        FourPairs(from_fn(|i| {
+            let low = low_half(self.0[i]) + low_half(other.0[i]);
+            let high = high_half(self.0[i]) + high_half(other.0[i]);
             low as u32 & 0xffff | (high as u32) << 16
         }))
     }

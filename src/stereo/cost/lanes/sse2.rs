@@ -97,6 +97,11 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
+    fn eq(self, other: Self) -> [__m128; 4] {
+        each!(I => _mm_cmpeq_ps(self.0[I], other.0[I]))
+    }
+
+    #[inline(always)]
     fn both(a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
         each!(I => _mm_and_ps(a[I], b[I]))
     }
@@ -282,6 +287,11 @@ impl Pairs for FourPairs {
             let twice = _mm_mulhi_epi16(self.0, _mm_slli_epi16::<2>(b.0));
             FourPairs(_mm_srai_epi16::<1>(_mm_add_epi16(twice, _mm_set1_epi16(1))))
         }
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        FourPairs(unsafe { _mm_add_epi16(self.0, other.0) })
     }
 
     #[inline(always)]

@@ -32,7 +32,7 @@ fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32], seed: u32) -> Vec<Words> 
     let less = L::both(x.lt(y), L::splat(-200.0).le(x));
     let index = L::load_words(&words(rng, 0xff));
     let (first, next) = L::fetch(memory, index);
-    let (fraction, whole) = (x.abs() + L::splat(0.75)).min(L::splat(3e4)).fraction_and_whole();
+    let (above, whole) = (x.abs() + L::splat(0.75)).min(L::splat(3e4)).nearest();
     let any = L::splat(f32::from(u8::from(L::any(less)) + 2 * u8::from(L::all(L::splat(-1e9).lt(x)))));
     let small = x.min(L::splat(1e6)).max(L::splat(-1e6));
     let [quad, u, v] = [!0, 0x7f_ffff, 0x3f_ffff].map(|kept| L::load_words(&words(rng, kept)));
@@ -45,8 +45,9 @@ fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32], seed: u32) -> Vec<Words> 
             .into_iter()
             .chain([
                 any,
-                fraction,
-                L::bell8(x.abs()),
+                above,
+                L::select(x.eq(x.max(y)), x, L::splat(1.0)),
+                L::bell(x.abs()),
                 L::bell64(x.abs()),
                 L::splat(x.sum()),
                 L::from_whole(quad),
@@ -56,7 +57,7 @@ fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32], seed: u32) -> Vec<Words> 
         .into_iter()
         .chain([L::shifted_right::<5>(quad)])
         .chain([L::plus(quad, u), L::negated(quad), small.truncated(), L::place(u, v, 300)])
-        .chain([L::gather(memory, index), L::bilinear(quad, u, v), L::whole(L::first(quad))]);
+        .chain([L::gather(memory, index), L::bilinear(quad, u, v)]);
     numbers
         .chain(bits)
         .map(|bits| stored(L::from_bits(bits)))
@@ -64,10 +65,10 @@ fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32], seed: u32) -> Vec<Words> 
         .collect()
 }
 
-/// Sums of products of pairs of 14-bit numbers.
-fn products<P: Pairs>(seed: u32) -> [Words; 2] {
+/// Products of pairs of 14-bit numbers, sums of them, and sums of pairs.
+fn products<P: Pairs>(seed: u32) -> [Words; 3] {
     let rng = &mut Rng::keyed(8, 9, 10, seed);
-    let mut out = [[0; 16]; 2];
+    let mut out = [[0; 16]; 3];
     let weights = words(rng, 0x7fff_7fff);
     // signed halves of fourteen bits
     let [a, b] = [(); 2].map(|()| words(rng, !0).map(|w| (w & 0xffff) as i16 >> 2).map(|v| v as u16));
@@ -78,6 +79,7 @@ fn products<P: Pairs>(seed: u32) -> [Words; 2] {
         let scaled = P::load(&weights, at).scaled(P::load(&a, at));
         scaled.store(&mut out[0], at);
         P::splat(77).plus_dot(scaled, P::load(&b, at)).store(&mut out[1], at);
+        P::load(&a, at).plus(P::load(&b, at)).store(&mut out[2], at);
     }
     out
 }
@@ -154,11 +156,11 @@ fn plain_lanes_compute_what_they_say() {
     assert!((f64::from(got) - want * 255.0 * 255.0 * 32.0).abs() < 1.0, "{got} {want}");
     assert_eq!(Sixteen::place([5 << 16 | 9; 16], [2 << 16 | 9; 16], 100), [205; 16]);
     assert_eq!(FourPairs::splat(0x4000_2000).scaled(FourPairs::splat(0x0064_ff9c)).0, [0x0032_ffe7; 4]);
-    let (fraction, column) = Sixteen::splat(6.75).fraction_and_whole();
-    let (_, row) = Sixteen::splat(2.25).fraction_and_whole();
+    let (above, column) = Sixteen::splat(5.75).nearest();
+    let (_, row) = Sixteen::splat(2.25).nearest();
     assert_eq!(
-        (stored(fraction), Sixteen::row_major(column, row, 100)),
-        ([0.75f32.to_bits(); 16], [206; 16])
+        (stored(above), Sixteen::row_major(column, row, 100)),
+        ([(-0.25f32).to_bits(); 16], [206; 16])
     );
     assert_eq!(Sixteen::fetch(&[1, 2, 3], [1; 16]), ([2; 16], [3; 16]));
 }
@@ -183,7 +185,7 @@ const BELL_TOLERANCE: [f32; 2] = [0.036, 0.005];
 fn bells_are_close_to_the_exponential() {
     for i in 0..400u16 {
         let x = f32::from(i) * 0.05;
-        let [b8, b64] = [Sixteen::bell8(Sixteen::splat(x)), Sixteen::bell64(Sixteen::splat(x))]
+        let [b8, b64] = [Sixteen::bell(Sixteen::splat(x / 8.0)), Sixteen::bell64(Sixteen::splat(x))]
             .map(|b| f32::from_bits(stored(b)[0]));
         let want = (-x).exp();
         assert!(b8 <= want + 1e-6 && want - b8 < BELL_TOLERANCE[0], "{x}: {b8} {want}");
