@@ -232,14 +232,14 @@ fn typical_inverse_depth(problem: &StereoProblem) -> f32 {
 }
 
 impl Source {
-    /// The grey level at the pixel of `(u, v)`, or the nearest one, in the units of [`Lanes::bilinear`].
+    /// The grey level at the pixel of `(u, v)`, or the nearest one, as a base of [`Lanes::bilinear`].
     ///
     /// [`Lanes::bilinear`]: super::cost::lanes::Lanes::bilinear
     pub(crate) fn level_at(&self, u: f32, v: f32) -> u32 {
         let x = (u.max(0.0) as usize).min(self.width - 1);
         let y = (v.max(0.0) as usize).min(self.height - 1);
         let level = self.bytes.get(y * self.width + x).copied().unwrap_or(0) as i8;
-        ((i32::from(level) * 255 * 255) << 5) as u32
+        (i32::from(level) * 255 * 255) as u32
     }
 }
 

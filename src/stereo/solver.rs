@@ -60,6 +60,8 @@ pub(crate) enum Start {
 
 /// Own planes are scored with so many of a tile's best views: an evaluation costs several times that of a shared plane.
 const OWN_VIEWS: usize = 3;
+/// The same for planes of a coarser level, few of which stay.
+const COARSER_VIEWS: usize = 2;
 
 /// Estimates one view: holds what the passes share.
 pub(crate) struct Solver<'a> {
@@ -152,7 +154,8 @@ impl<'a> Solver<'a> {
                 let plane = self.tile.plane_at(x, y);
                 (self.kernels.survey)(&mut self.tile, self.level, plane);
                 self.tile.rank_views();
-                self.tile.views = OWN_VIEWS.min(all);
+                let views = if pass.start == Start::Coarser { COARSER_VIEWS } else { OWN_VIEWS };
+                self.tile.views = views.min(all);
             }
         }
         (self.kernels.score_own)(&mut self.tile, self.level);

@@ -55,43 +55,46 @@ fn of_row<L: Lanes>(patch: &Patch, source: &Source, at: (f32, f32), planes: [L; 
 /// Sums over the windows of row `y`; samples are clamped.
 #[inline(always)]
 fn correlated<L: Lanes>(patch: &Patch, source: &Source, warps: &WarpRow<L>, y: usize) -> SumRows {
-    let shift = L::negated(sample::<L>(source, warps, 2, 2));
+    let base = below_zero::<L>(sample::<L>(source, warps, 2, 2, L::whole(0)));
     let mut samples = [[0; TILE_W]; TAPS];
     for (tap, samples) in samples.iter_mut().enumerate() {
         let (i, j) = (tap / TAP_COLUMNS, tap % TAP_COLUMNS);
-        let below = if i + 1 < TAP_ROWS {
-            L::plus(sample::<L>(source, warps, 2 * i + 1, j), shift)
-        } else {
-            L::whole(0)
-        };
-        let here = L::plus(sample::<L>(source, warps, 2 * i, j), shift);
+        let below =
+            if i + 1 < TAP_ROWS { sample::<L>(source, warps, 2 * i + 1, j, base) } else { L::whole(0) };
+        let here = sample::<L>(source, warps, 2 * i, j, base);
         L::store_words(L::paired(here, below), samples);
     }
     of_samples::<L>(patch, y, &samples)
 }
 
+/// What takes samples from a zero at `level`, a sample itself.
+#[inline(always)]
+fn below_zero<L: Lanes>(level: L::Bits) -> L::Bits {
+    L::shifted_right::<5>(L::negated(level))
+}
+
 /// Samples of row `i`, column `j` of the matching windows.
 #[inline(always)]
-fn sample<L: Lanes>(source: &Source, warps: &WarpRow<L>, i: usize, j: usize) -> L::Bits {
+fn sample<L: Lanes>(source: &Source, warps: &WarpRow<L>, i: usize, j: usize, base: L::Bits) -> L::Bits {
     let (u, v) = warps.near((2 * j) as f32 - REACH as f32, (2 * i) as f32 - REACH as f32);
     let (u, v, _) = clamped(source, u, v);
-    texels::<L>(source, u.truncated(), v.truncated())
+    texels::<L>(source, u.truncated(), v.truncated(), base)
 }
 
 /// Sums over the windows of row `y`, which are inside the source, by warps that are quadratic in the offset.
 #[inline(always)]
 fn smooth<L: Lanes>(patch: &Patch, source: &Source, warps: &WarpRow<L>, y: usize) -> SumRows {
     let [u, v] = warps.centre;
-    let shift = L::negated(texels::<L>(source, u.truncated(), v.truncated()));
+    let base = below_zero::<L>(texels::<L>(source, u.truncated(), v.truncated(), L::whole(0)));
     let mut samples = [[0; TILE_W]; TAPS];
     for (i, samples) in samples.chunks_exact_mut(TAP_COLUMNS).enumerate() {
         let mut upper = TapRow::new(warps, 2 * i);
         let mut lower = TapRow::new(warps, 2 * i + 1);
         for samples in samples {
-            let here = L::plus(texels::<L>(source, upper.at[0], upper.at[1]), shift);
+            let here = texels::<L>(source, upper.at[0], upper.at[1], base);
             upper.advance();
             let below = if i + 1 < TAP_ROWS {
-                L::plus(texels::<L>(source, lower.at[0], lower.at[1]), shift)
+                texels::<L>(source, lower.at[0], lower.at[1], base)
             } else {
                 L::whole(0)
             };

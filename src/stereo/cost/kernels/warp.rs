@@ -164,7 +164,7 @@ pub(super) fn warp<L: Lanes>(
 /// Sixteen texels at a time: eight columns of two rows, then of the next two rows, so that rows pair up lane by lane.
 #[inline(always)]
 fn sample<L: Lanes, const WHOLE: bool>(source: &Source, m: &Warp, scratch: &mut Scratch) {
-    let shift = L::whole(source.level_at(m.u, m.v).wrapping_neg());
+    let base = L::whole(source.level_at(m.u, m.v).wrapping_neg());
     for c in 0..WIN_W / COLUMNS {
         let mut above = L::whole(0);
         for k in 0..WIN_H / 2 {
@@ -178,7 +178,7 @@ fn sample<L: Lanes, const WHOLE: bool>(source: &Source, m: &Warp, scratch: &mut 
                     row[c * COLUMNS..][..COLUMNS].copy_from_slice(marks);
                 }
             }
-            let texels = L::plus(texels::<L>(source, u.truncated(), v.truncated()), shift);
+            let texels = texels::<L>(source, u.truncated(), v.truncated(), base);
             if k > 0 {
                 put::<L>(L::paired(above, texels), &mut scratch.warped[2 * k - 2..], c);
             }
@@ -192,7 +192,7 @@ fn sample<L: Lanes, const WHOLE: bool>(source: &Source, m: &Warp, scratch: &mut 
 /// rows of the source, 0 if that is not known.
 #[inline(always)]
 fn smooth<L: Lanes, const ROWS: usize>(source: &Source, m: &Warp, scratch: &mut Scratch) {
-    let shift = L::whole(source.level_at(m.u, m.v).wrapping_neg());
+    let base = L::whole(source.level_at(m.u, m.v).wrapping_neg());
     let (width, bytes, quads) = (source.width, &source.bytes[..], &source.quads[..]);
     let corners = if ROWS > 0 { Corners::new::<L>(m, width) } else { Corners::NONE };
     for c in 0..WIN_W / COLUMNS {
@@ -208,7 +208,7 @@ fn smooth<L: Lanes, const ROWS: usize>(source: &Source, m: &Warp, scratch: &mut 
                     (L::plus(u, L::whole(corners.back[i])), L::plus(v, L::whole(corners.up[i])));
                 L::lookup::<ROWS>(bytes, first, width, right, down)
             };
-            let texels = L::plus(L::bilinear(quads, u, v), shift);
+            let texels = L::bilinear(quads, u, v, base);
             column.advance();
             if k > 0 {
                 put::<L>(L::paired(above, texels), &mut scratch.warped[2 * k - 2..], c);
@@ -406,9 +406,9 @@ pub(super) fn clamped<L: Lanes>(source: &Source, u: L, v: L) -> (L, L, L::Mask) 
     (ku, kv, L::both(ku.eq(u), kv.eq(v)))
 }
 
-/// Bilinear samples of the source at fixed-point pixels, in the high halves: about 1/64 grey levels from mid-grey.
+/// Bilinear samples of the source at fixed-point pixels, above `base`; see [`Lanes::bilinear`].
 #[inline(always)]
-pub(super) fn texels<L: Lanes>(source: &Source, u: L::Bits, v: L::Bits) -> L::Bits {
+pub(super) fn texels<L: Lanes>(source: &Source, u: L::Bits, v: L::Bits, base: L::Bits) -> L::Bits {
     let index = L::place(u, v, source.width as u32);
-    L::bilinear(L::gather(&source.quads, index), u, v)
+    L::bilinear(L::gather(&source.quads, index), u, v, base)
 }

@@ -236,8 +236,8 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
-    fn bilinear(quad: Bits, column: Bits, row: Bits) -> Bits {
-        (bilinear8(quad.0, column.0, row.0), bilinear8(quad.1, column.1, row.1))
+    fn bilinear(quad: Bits, column: Bits, row: Bits, base: Bits) -> Bits {
+        (bilinear8(quad.0, column.0, row.0, base.0), bilinear8(quad.1, column.1, row.1, base.1))
     }
 
     #[inline(always)]
@@ -294,7 +294,7 @@ impl Pairs for EightPairs {
 
 /// [`Lanes::bilinear`] of one register.
 #[inline(always)]
-fn bilinear8(quad: __m256i, column: __m256i, row: __m256i) -> __m256i {
+fn bilinear8(quad: __m256i, column: __m256i, row: __m256i, base: __m256i) -> __m256i {
     const SECOND: i32 = 0x0101_0101;
     const EVEN: i32 = 0x8001_8001_u32 as i32;
     unsafe {
@@ -305,7 +305,8 @@ fn bilinear8(quad: __m256i, column: __m256i, row: __m256i) -> __m256i {
         let down = _mm256_shuffle_epi8(row, _mm256_or_si256(lane, _mm256_set1_epi32(EVEN)));
         let across = _mm256_xor_si256(across, _mm256_set1_epi32(0x00ff_00ff));
         let down = _mm256_xor_si256(down, _mm256_set1_epi32(0x0000_00ff));
-        _mm256_slli_epi32::<5>(_mm256_madd_epi16(_mm256_maddubs_epi16(across, quad), down))
+        let sample = _mm256_madd_epi16(_mm256_maddubs_epi16(across, quad), down);
+        _mm256_slli_epi32::<5>(_mm256_add_epi32(sample, base))
     }
 }
 

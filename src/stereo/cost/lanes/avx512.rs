@@ -238,20 +238,22 @@ impl Lanes for One {
     }
 
     #[inline(always)]
-    fn bilinear(quad: __m512i, column: __m512i, row: __m512i) -> __m512i {
+    fn bilinear(quad: __m512i, column: __m512i, row: __m512i, base: __m512i) -> __m512i {
         unsafe {
             let lane = _mm512_set4_epi32(0x0c0c_0c0c, 0x0808_0808, 0x0404_0404, 0);
             let all = _mm512_or_si512(lane, Self::whole(0x0101_0101));
             let even = _mm512_or_si512(lane, Self::whole(0x8001_8001));
             let across = _mm512_xor_si512(_mm512_shuffle_epi8(column, all), Self::whole(0x00ff_00ff));
             let down = _mm512_xor_si512(_mm512_shuffle_epi8(row, even), Self::whole(0x0000_00ff));
-            _mm512_slli_epi32::<5>(_mm512_madd_epi16(_mm512_maddubs_epi16(across, quad), down))
+            _mm512_slli_epi32::<5>(plus_dot(base, _mm512_maddubs_epi16(across, quad), down))
         }
     }
 
     #[inline(always)]
     fn paired(low: __m512i, high: __m512i) -> __m512i {
-        unsafe { _mm512_or_si512(_mm512_srli_epi32::<16>(low), Self::masked(high, 0xffff_0000)) }
+        // `low | high & mask`; compilers would make a slower permutation of it
+        let mask = Self::whole(0xffff_0000);
+        unsafe { _mm512_ternarylogic_epi32::<0b1111_1000>(_mm512_srli_epi32::<16>(low), high, mask) }
     }
 }
 

@@ -109,8 +109,9 @@ pub(crate) trait Lanes:
         column
     }
     /// Bilinear samples of four signed bytes (left, right, left below, right below, from the low byte up) at the
-    /// fractions of fixed-point numbers with 16 fractional bits, of which eight are used: 255² · 32 times the bytes.
-    fn bilinear(quad: Self::Bits, column: Self::Bits, row: Self::Bits) -> Self::Bits;
+    /// fractions of fixed-point numbers with 16 fractional bits, of which eight are used: 255² times the bytes, and `base`
+    /// more; all of it 32 times, modulo 2³².
+    fn bilinear(quad: Self::Bits, column: Self::Bits, row: Self::Bits, base: Self::Bits) -> Self::Bits;
     /// The high halves of two words as one: `low`'s in the low half.
     fn paired(low: Self::Bits, high: Self::Bits) -> Self::Bits;
     /// The sum of the lanes, left to right.

@@ -214,8 +214,8 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
-    fn bilinear(quad: Bits, column: Bits, row: Bits) -> Bits {
-        each!(I => bilinear4(quad[I], column[I], row[I]))
+    fn bilinear(quad: Bits, column: Bits, row: Bits, base: Bits) -> Bits {
+        each!(I => bilinear4(quad[I], column[I], row[I], base[I]))
     }
 
     #[inline(always)]
@@ -237,7 +237,7 @@ fn gather4(memory: &[u32], index: uint32x4_t) -> uint32x4_t {
 
 /// [`Lanes::bilinear`] of one register.
 #[inline(always)]
-fn bilinear4(quad: uint32x4_t, column: uint32x4_t, row: uint32x4_t) -> uint32x4_t {
+fn bilinear4(quad: uint32x4_t, column: uint32x4_t, row: uint32x4_t, base: uint32x4_t) -> uint32x4_t {
     unsafe {
         let byte = vdupq_n_u32(0xff);
         let f = vandq_u32(vshrq_n_u32::<8>(column), byte);
@@ -250,7 +250,7 @@ fn bilinear4(quad: uint32x4_t, column: uint32x4_t, row: uint32x4_t) -> uint32x4_
         // left · (255 − f) + right · f, modulo 2¹⁶
         let across = vmulq_s16(vsubq_s16(right, left), f);
         let across = vaddq_s16(across, vsubq_s16(vshlq_n_s16::<8>(left), left));
-        vshlq_n_u32::<5>(vreinterpretq_u32_s32(dot(across, down)))
+        vshlq_n_u32::<5>(vaddq_u32(vreinterpretq_u32_s32(dot(across, down)), base))
     }
 }
 

@@ -188,12 +188,12 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn bilinear(quad: [u32; 16], column: [u32; 16], row: [u32; 16]) -> [u32; 16] {
+    fn bilinear(quad: [u32; 16], column: [u32; 16], row: [u32; 16], base: [u32; 16]) -> [u32; 16] {
         from_fn(|i| {
             let [a, b, c, d] = quad[i].to_le_bytes().map(|v| i32::from(v as i8));
             let (f, g) = ((column[i] >> 8 & 255) as i32, (row[i] >> 8 & 255) as i32);
             let (top, bottom) = (a * (255 - f) + b * f, c * (255 - f) + d * f);
-            ((top * (255 - g) + bottom * g) << 5) as u32
+            ((top * (255 - g) + bottom * g) as u32).wrapping_add(base[i]) << 5
         })
     }
 

@@ -212,8 +212,8 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
-    fn bilinear(quad: Bits, column: Bits, row: Bits) -> Bits {
-        each!(I => bilinear4(quad[I], column[I], row[I]))
+    fn bilinear(quad: Bits, column: Bits, row: Bits, base: Bits) -> Bits {
+        each!(I => bilinear4(quad[I], column[I], row[I], base[I]))
     }
 
     #[inline(always)]
@@ -237,7 +237,7 @@ fn gather4(memory: &[u32], index: __m128i) -> __m128i {
 
 /// [`Lanes::bilinear`] of one register.
 #[inline(always)]
-fn bilinear4(quad: __m128i, column: __m128i, row: __m128i) -> __m128i {
+fn bilinear4(quad: __m128i, column: __m128i, row: __m128i, base: __m128i) -> __m128i {
     unsafe {
         let byte = _mm_set1_epi32(0xff);
         let f = _mm_and_si128(_mm_srli_epi32::<8>(column), byte);
@@ -249,7 +249,7 @@ fn bilinear4(quad: __m128i, column: __m128i, row: __m128i) -> __m128i {
         // left · (255 − f) + right · f, modulo 2¹⁶
         let across = _mm_mullo_epi16(_mm_sub_epi16(right, left), f);
         let across = _mm_add_epi16(across, _mm_sub_epi16(_mm_slli_epi16::<8>(left), left));
-        _mm_slli_epi32::<5>(_mm_madd_epi16(across, down))
+        _mm_slli_epi32::<5>(_mm_add_epi32(_mm_madd_epi16(across, down), base))
     }
 }
 

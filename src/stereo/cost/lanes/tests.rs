@@ -57,7 +57,7 @@ fn results<L: Lanes>(a: &Row, b: &Row, memory: &[u32], seed: u32) -> Vec<Words> 
         .into_iter()
         .chain([L::shifted_right::<5>(quad)])
         .chain([L::plus(quad, u), L::negated(quad), small.truncated(), L::place(u, v, 300)])
-        .chain([L::gather(memory, index), L::bilinear(quad, u, v)]);
+        .chain([L::gather(memory, index), L::bilinear(quad, u, v, quad)]);
     numbers
         .chain(bits)
         .map(|bits| stored(L::from_bits(bits)))
@@ -152,8 +152,9 @@ fn plain_lanes_compute_what_they_say() {
     let quad = [u32::from_le_bytes([16, 32, -16i8 as u8, 0]); 16];
     let (f, g) = (64.0 / 255.0, 128.0 / 255.0);
     let want = (16.0 + f * 16.0) * (1.0 - g) + (-16.0 + f * 16.0) * g;
-    let got = Sixteen::bilinear(quad, [3 << 16 | 64 << 8; 16], [7 << 16 | 128 << 8; 16])[0] as i32;
-    assert!((f64::from(got) - want * 255.0 * 255.0 * 32.0).abs() < 1.0, "{got} {want}");
+    let got =
+        Sixteen::bilinear(quad, [3 << 16 | 64 << 8; 16], [7 << 16 | 128 << 8; 16], [1000; 16])[0] as i32;
+    assert!((f64::from(got) - (want * 255.0 * 255.0 + 1000.0) * 32.0).abs() < 1.0, "{got} {want}");
     assert_eq!(Sixteen::place([5 << 16 | 9; 16], [2 << 16 | 9; 16], 100), [205; 16]);
     assert_eq!(FourPairs::splat(0x4000_2000).scaled(FourPairs::splat(0x0064_ff9c)).0, [0x0032_ffe7; 4]);
     let (above, column) = Sixteen::splat(5.75).nearest();
