@@ -25,7 +25,7 @@ pub struct UnbiasedFilterOptions {
     pub max_neighbors: u32,
     /// Confidences (0..1) of a depth and of those that confirm it must add up to this, and to as much again for every
     /// neighbour that contradicts it; mirror images behind windows and clouds in the sky are seen by many views, but by
-    /// none well. 0 asks for nothing. Default 0.025.
+    /// none well. 0 asks for nothing. Default 0.035.
     pub min_evidence: f32,
     /// Confidence (0..1) that a depth must have itself, whoever confirms it. Default 0.0003: a matching cost of 0.64.
     pub min_confidence: f32,
@@ -38,7 +38,7 @@ impl Default for UnbiasedFilterOptions {
             min_confirming: 1,
             contradictions_per_confirmation: 0.5,
             max_neighbors: 8,
-            min_evidence: 0.025,
+            min_evidence: 0.035,
             min_confidence: 0.0003,
         }
     }
@@ -58,7 +58,7 @@ impl UnbiasedFilterOptions {
         }
         if !(self.min_evidence >= 0.0 && self.min_evidence.is_finite()) {
             return Err(Error::invalid(format!(
-                "the unbiased filter's least evidence is {}: give a sum of confidences, such as 0.025",
+                "the unbiased filter's least evidence is {}: give a sum of confidences, such as 0.035",
                 self.min_evidence
             )));
         }

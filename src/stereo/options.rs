@@ -36,10 +36,11 @@ pub struct StereoOptions {
     pub iterations: u32,
     /// Passes that also compare a hypothesis with the neighbours' depth maps. 0..=100. Default: 2.
     pub geometric_iterations: u32,
-    /// Planes from within a tile, and as many from beside it, that its pixels try at a visit; two thirds of that in
-    /// passes with the neighbours' depth maps, which propose planes themselves. 1..=64. Default: 6.
+    /// Planes from within a tile, and as many from beside it, that its pixels try at a visit; two fifths of that in
+    /// passes with the neighbours' depth maps, which propose planes themselves. 1..=64. Default: 10.
     pub candidates: u32,
-    /// Small changes of a tile's planes, and as many planes fitted to its pixels, tried at a visit. 0..=64. Default: 4.
+    /// Small changes of a tile's planes, and as many planes fitted to its pixels, tried at a visit; four fifths of that in
+    /// passes with the neighbours' depth maps. 0..=64. Default: 5.
     pub refinements: u32,
     /// Source views, the best of each tile, that hypotheses are compared with; passes with the neighbours' depth maps
     /// take one more. 1..=64. Default: 3.
@@ -58,8 +59,8 @@ impl Default for StereoOptions {
             levels: 2,
             iterations: 3,
             geometric_iterations: 2,
-            candidates: 6,
-            refinements: 4,
+            candidates: 10,
+            refinements: 5,
             compared_views: 3,
             keep_cost: 1.0,
             geometric_weight: 0.1,
@@ -73,8 +74,8 @@ impl StereoOptions {
     pub fn of(quality: Quality) -> Self {
         let (candidates, refinements, compared_views) = match quality {
             Quality::Draft => (3, 2, 2),
-            Quality::Normal => (6, 4, 3),
-            Quality::High => (8, 8, 4),
+            Quality::Normal => (10, 5, 3),
+            Quality::High => (14, 10, 4),
         };
         StereoOptions { candidates, refinements, compared_views, ..StereoOptions::default() }
     }

@@ -18,7 +18,7 @@ const SAME_PROPOSAL: f32 = 0.25;
 /// Shift of the tile grid in successive passes.
 const SHIFTS: [(i32, i32); 4] = [(0, 0), (-8, -4), (-4, -2), (-12, -6)];
 /// Planes tried that the sources' depth maps propose for a tile.
-const PROPOSALS: usize = 8;
+const PROPOSALS: usize = 16;
 /// Mean cost above which a tile is tried with random planes.
 const BAD_TILE: f32 = 0.5;
 
