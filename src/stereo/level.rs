@@ -235,6 +235,7 @@ impl Source {
     /// The grey level at the pixel of `(u, v)`, or the nearest one, as a base of [`Lanes::bilinear`].
     ///
     /// [`Lanes::bilinear`]: super::cost::lanes::Lanes::bilinear
+    #[inline(always)]
     pub(crate) fn level_at(&self, u: f32, v: f32) -> u32 {
         let x = (u.max(0.0) as usize).min(self.width - 1);
         let y = (v.max(0.0) as usize).min(self.height - 1);
