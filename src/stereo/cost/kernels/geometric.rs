@@ -1,6 +1,6 @@
 //! The geometric term: agreement with the source views' own depth maps.
 
-use super::{LANE, Lanes};
+use super::Lanes;
 use crate::stereo::level::SourceGeometry;
 
 /// A source depth farther than this from the hypothesis, relatively, says nothing about it but "disagrees".
@@ -12,12 +12,11 @@ const CAP: f32 = 4.0;
 /// far, in pixels, the source's own depth map is off, sampled backwards with its plane at the exact position, so that
 /// the term pulls neither way.
 #[inline(always)]
-pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, (x, y): (f32, f32), w: L, weight: f32) -> L {
-    let column = L::splat(x) + L::load(&LANE);
+pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, at: (L, L), w: L, weight: f32) -> L {
     let (one, near) = (L::splat(1.0), L::splat(1e-6));
-    let z = projected(g, 2, column, y, w);
+    let z = projected(g, 2, at, w);
     let r = one / near.max(z);
-    let (u, v) = (projected(g, 0, column, y, w) * r, projected(g, 1, column, y, w) * r);
+    let (u, v) = (projected(g, 0, at, w) * r, projected(g, 1, at, w) * r);
     let ku = one.max(u).min(L::splat(g.width as f32 - 2.0));
     let kv = one.max(v).min(L::splat(g.height as f32 - 2.0));
     let inside = L::both(L::both(ku.eq(u), kv.eq(v)), near.lt(z));
@@ -41,6 +40,6 @@ pub(super) fn geometric_term<L: Lanes>(g: &SourceGeometry, (x, y): (f32, f32), w
 /// Homogeneous coordinate `r` of the source pixels of a row of hypotheses. Not a closure: those are compiled without the
 /// instructions of the kernel that calls them.
 #[inline(always)]
-fn projected<L: Lanes>(g: &SourceGeometry, r: usize, column: L, y: f32, w: L) -> L {
-    L::splat(g.a[r][0]) * column + L::splat(g.a[r][1] * y + g.a[r][2]) + L::splat(g.b[r]) * w
+fn projected<L: Lanes>(g: &SourceGeometry, r: usize, (x, y): (L, L), w: L) -> L {
+    L::splat(g.a[r][0]) * x + (L::splat(g.a[r][1]) * y + L::splat(g.a[r][2])) + L::splat(g.b[r]) * w
 }

@@ -26,6 +26,10 @@ const ZERO: Row = [0.0; TILE_W];
 /// The number of each lane.
 const LANE: Row = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
+/// Centres of two by two pixels, eight in a row of them and eight in the next.
+const PAIRS_X: Row = [0.5, 2.5, 4.5, 6.5, 8.5, 10.5, 12.5, 14.5, 0.5, 2.5, 4.5, 6.5, 8.5, 10.5, 12.5, 14.5];
+const PAIRS_Y: Row = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5];
+
 /// The 16 values from column `at`.
 #[inline(always)]
 fn cut<L: Lanes>(row: &WinRow, at: usize) -> L {
@@ -78,15 +82,18 @@ fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> b
             reject_outside::<L>(&scratch.valid, &mut scratch.cost);
         }
         if let Some(g) = &source.geometry {
-            for y in (0..TILE_H).step_by(2) {
-                let between = y as f32 + 0.5;
-                let column = L::load(&LANE) - L::splat(CENTRE.0);
-                let w = L::splat(plane.w + plane.wy * (between - CENTRE.1)) + L::splat(plane.wx) * column;
-                let at = (*x0 as f32, *y0 as f32 + between);
-                let term = geometric_term(g, at, w, level.geometric_weight);
-                for row in &mut scratch.cost[y..y + 2] {
-                    let cost = L::load(row);
-                    L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost).store(row);
+            for y in (0..TILE_H).step_by(4) {
+                let (x, y_in) = (L::load(&PAIRS_X), L::load(&PAIRS_Y) + L::splat(y as f32));
+                let w = L::splat(plane.w)
+                    + L::splat(plane.wx) * (x - L::splat(CENTRE.0))
+                    + L::splat(plane.wy) * (y_in - L::splat(CENTRE.1));
+                let at = (L::splat(*x0 as f32) + x, L::splat(*y0 as f32) + y_in);
+                let terms = L::doubled(geometric_term(g, at, w, level.geometric_weight));
+                for (rows, term) in scratch.cost[y..y + 4].chunks_exact_mut(2).zip(terms) {
+                    for row in rows {
+                        let cost = L::load(row);
+                        L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost).store(row);
+                    }
                 }
             }
         }

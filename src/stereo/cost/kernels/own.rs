@@ -16,6 +16,7 @@ pub(in crate::stereo::cost) fn score_own<L: Lanes>(tile: &mut Tile, level: &Leve
     let Tile { x0, y0, classes, patch, belief, order, views, .. } = tile;
     for y in 0..TILE_H {
         let at = (*x0 as f32, (*y0 + y as i32) as f32);
+        let column = L::splat(at.0) + L::load(&LANE);
         let planes = [L::load(&belief.w[y]), L::load(&belief.wx[y]), L::load(&belief.wy[y])];
         let (mut best, mut second) = ([UNSEEN; TILE_W], [UNSEEN; TILE_W]);
         for &k in order.iter().take(*views) {
@@ -25,7 +26,7 @@ pub(in crate::stereo::cost) fn score_own<L: Lanes>(tile: &mut Tile, level: &Leve
             }
             let mut cost = of_row(patch, source, at, planes, y);
             if let Some(g) = &source.geometry {
-                let term = geometric_term(g, at, planes[0], level.geometric_weight);
+                let term = geometric_term(g, (column, L::splat(at.1)), planes[0], level.geometric_weight);
                 cost = L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost);
             }
             if let Some(labels) = &source.labels {

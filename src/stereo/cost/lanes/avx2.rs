@@ -122,6 +122,18 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
+    fn doubled(self) -> [Self; 2] {
+        unsafe {
+            let low = _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3);
+            let high = _mm256_setr_epi32(4, 4, 5, 5, 6, 6, 7, 7);
+            [
+                Two(_mm256_permutevar8x32_ps(self.0, low), _mm256_permutevar8x32_ps(self.0, high)),
+                Two(_mm256_permutevar8x32_ps(self.1, low), _mm256_permutevar8x32_ps(self.1, high)),
+            ]
+        }
+    }
+
+    #[inline(always)]
     fn to_bits(self) -> Bits {
         unsafe { (_mm256_castps_si256(self.0), _mm256_castps_si256(self.1)) }
     }

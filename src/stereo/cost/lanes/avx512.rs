@@ -104,6 +104,15 @@ impl Lanes for One {
     }
 
     #[inline(always)]
+    fn doubled(self) -> [Self; 2] {
+        unsafe {
+            let low = _mm512_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7);
+            let high = _mm512_add_epi32(low, Self::whole(8));
+            [One(_mm512_permutexvar_ps(low, self.0)), One(_mm512_permutexvar_ps(high, self.0))]
+        }
+    }
+
+    #[inline(always)]
     fn to_bits(self) -> __m512i {
         unsafe { _mm512_castps_si512(self.0) }
     }

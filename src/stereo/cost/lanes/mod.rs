@@ -65,6 +65,8 @@ pub(crate) trait Lanes:
     fn all(mask: Self::Mask) -> bool;
     /// `yes` where the mask is set, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// The first eight lanes and the others, each lane twice.
+    fn doubled(self) -> [Self; 2];
     fn to_bits(self) -> Self::Bits;
     fn from_bits(bits: Self::Bits) -> Self;
     fn whole(v: u32) -> Self::Bits;

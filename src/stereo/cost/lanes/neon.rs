@@ -121,6 +121,15 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
+    fn doubled(self) -> [Self; 2] {
+        let [a, b, c, d] = self.0;
+        unsafe {
+            let twice = |a, b| Four([vzip1q_f32(a, a), vzip2q_f32(a, a), vzip1q_f32(b, b), vzip2q_f32(b, b)]);
+            [twice(a, b), twice(c, d)]
+        }
+    }
+
+    #[inline(always)]
     fn to_bits(self) -> Bits {
         each!(I => vreinterpretq_u32_f32(self.0[I]))
     }

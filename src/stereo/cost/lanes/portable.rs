@@ -105,6 +105,11 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
+    fn doubled(self) -> [Self; 2] {
+        [0, 8].map(|first| Sixteen(from_fn(|i| self.0[first + i / 2])))
+    }
+
+    #[inline(always)]
     fn to_bits(self) -> [u32; 16] {
         self.0.map(f32::to_bits)
     }

@@ -122,6 +122,22 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
+    fn doubled(self) -> [Self; 2] {
+        let [a, b, c, d] = self.0;
+        unsafe {
+            let twice = |a, b| {
+                Four([
+                    _mm_unpacklo_ps(a, a),
+                    _mm_unpackhi_ps(a, a),
+                    _mm_unpacklo_ps(b, b),
+                    _mm_unpackhi_ps(b, b),
+                ])
+            };
+            [twice(a, b), twice(c, d)]
+        }
+    }
+
+    #[inline(always)]
     fn to_bits(self) -> Bits {
         each!(I => _mm_castps_si128(self.0[I]))
     }
