@@ -69,24 +69,24 @@ fn window_rows<P: Pairs, const X: usize, const G: usize>(
 ) {
     let row = (first + 4 * G) % WIN_H;
     let [upper, lower] = sums;
-    let mut weighted = [[P::splat(0); TAP_COLUMNS]; 2];
-    for j in 0..TAP_COLUMNS {
+    let [mut upper_weighted, mut lower_weighted] = [[P::splat(0); TAP_COLUMNS]; 2];
+    for (j, (of_upper, of_lower)) in upper_weighted.iter_mut().zip(&mut lower_weighted).enumerate() {
         let v = P::load(&warped[row], X + 2 * j);
         let t = P::load(&patch.pairs[row], X + 2 * j);
         if G < TAP_ROWS {
             let weight = P::load(&patch.weight[first % TILE_H][TAP_COLUMNS * G + j], X);
-            weighted[0][j] = add_products(upper, v, t, weight);
+            *of_upper = add_products(upper, v, t, weight);
         }
         if G > 0 {
             let weight = P::load(&patch.weight[(first + 4) % TILE_H][TAP_COLUMNS * (G - 1) + j], X);
-            weighted[1][j] = add_products(lower, v, t, weight);
+            *of_lower = add_products(lower, v, t, weight);
         }
     }
     if G < TAP_ROWS {
-        add(upper, weighted[0]);
+        add(upper, upper_weighted);
     }
     if G > 0 {
-        add(lower, weighted[1]);
+        add(lower, lower_weighted);
     }
 }
 

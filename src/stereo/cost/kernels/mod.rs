@@ -1,6 +1,7 @@
 //! The kernels, written once over [`Lanes`]; an instruction set supplies the lanes.
 
 mod contest;
+mod corners;
 mod correlation;
 mod geometric;
 mod label;

@@ -1,6 +1,7 @@
 //! The source side: a window warped by the homography of a plane.
 
 use super::Lanes;
+use super::corners::{Corners, Footprint, STEPS};
 use crate::stereo::level::Source;
 use crate::stereo::plane::InversePlane;
 use crate::stereo::tile::{CENTRE, Row, Scratch, TILE_W, WIN_H, WIN_W, WinWords};
@@ -8,16 +9,16 @@ use crate::stereo::tile::{CENTRE, Row, Scratch, TILE_W, WIN_H, WIN_W, WinWords};
 /// Depth ratio, corner of a window to its centre, below which a window is behind or beside the source.
 pub(super) const MIN_DEPTH_RATIO: f32 = 0.3;
 /// Half the extent of the window.
-const HALF: (f32, f32) = ((WIN_W as f32 - 1.0) / 2.0, (WIN_H as f32 - 1.0) / 2.0);
+pub(super) const HALF: (f32, f32) = ((WIN_W as f32 - 1.0) / 2.0, (WIN_H as f32 - 1.0) / 2.0);
 /// Change of the depth ratio within the window up to which a warp is quadratic: the error, in pixels, is below a window's
 /// half extent times the square of this.
 pub(super) const SMOOTH: f32 = 0.03;
 /// Steps per pixel of fixed-point source pixels.
 pub(super) const FIXED: f32 = 65_536.0;
 /// Added to the extent of footprints for rounding, in pixels.
-const SLACK: f32 = 0.02;
+pub(super) const SLACK: f32 = 0.02;
 /// Columns of the window in one vector, of two rows.
-const COLUMNS: usize = TILE_W / 2;
+pub(super) const COLUMNS: usize = TILE_W / 2;
 const LANE_X: Row = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 const LANE_Y: Row = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
 
@@ -31,15 +32,15 @@ pub(super) enum Coverage {
 
 /// The homography of a plane around an anchor pixel: source pixel of an offset `(ox, oy)` is
 /// `centre + (ox·du_dx + oy·du_dy) / z` with `z = 1 + ox·z_dx + oy·z_dy`, likewise for v.
-struct Warp {
-    u: f32,
-    v: f32,
-    du_dx: f32,
-    du_dy: f32,
-    dv_dx: f32,
-    dv_dy: f32,
-    z_dx: f32,
-    z_dy: f32,
+pub(super) struct Warp {
+    pub(super) u: f32,
+    pub(super) v: f32,
+    pub(super) du_dx: f32,
+    pub(super) du_dy: f32,
+    pub(super) dv_dx: f32,
+    pub(super) dv_dy: f32,
+    pub(super) z_dx: f32,
+    pub(super) z_dy: f32,
 }
 
 impl Warp {
@@ -216,118 +217,6 @@ fn smooth<L: Lanes, const ROWS: usize>(source: &Source, m: &Warp, scratch: &mut 
             above = texels;
         }
         put::<L>(L::paired(above, L::whole(0)), &mut scratch.warped[WIN_H - 2..], c);
-    }
-}
-
-/// Vectors of a column of the window.
-const STEPS: usize = WIN_H / 2;
-/// Numbers of vectors of the window, in whole registers.
-const CORNERS: usize = 2 * TILE_W;
-
-/// For every vector of the window, a corner of the source before all of its texels.
-struct Corners {
-    /// Position in the source, row by row.
-    offset: [u32; CORNERS],
-    /// What takes fixed-point columns to those from the corner on.
-    back: [u32; CORNERS],
-    /// The same for rows.
-    up: [u32; CORNERS],
-}
-
-impl Corners {
-    const NONE: Self = Corners { offset: [0; CORNERS], back: [0; CORNERS], up: [0; CORNERS] };
-
-    #[inline(always)]
-    fn new<L: Lanes>(m: &Warp, width: usize) -> Self {
-        let mut out = Corners::NONE;
-        let low =
-            [Footprint::of(m, m.du_dx, m.du_dy).low_fixed(), Footprint::of(m, m.dv_dx, m.dv_dy).low_fixed()];
-        let step = L::load(&CORNER_Y);
-        for half in 0..CORNERS / TILE_W {
-            let ox = L::load(&CORNER_X) + L::splat((2 * half * COLUMNS) as f32);
-            let e = ox * L::splat(m.z_dx) + step * L::splat(m.z_dy);
-            let u = corner(m.u, m.du_dx, m.du_dy, low[0], (ox, step, e));
-            let v = corner(m.v, m.dv_dx, m.dv_dy, low[1], (ox, step, e));
-            let cut = half * TILE_W;
-            for (words, to) in [
-                (L::place(u, v, width as u32), &mut out.offset),
-                (L::negated(L::masked(u, 0xffff_0000)), &mut out.back),
-                (L::negated(L::masked(v, 0xffff_0000)), &mut out.up),
-            ] {
-                if let Some(to) = to[cut..].first_chunk_mut() {
-                    L::store_words(words, to);
-                }
-            }
-        }
-        out
-    }
-}
-
-/// The low end of where the texels of vectors are whose first ones have offsets `(ox, oy)` from the centre, in fixed point;
-/// `e` is how much farther away they are.
-#[inline(always)]
-fn corner<L: Lanes>(centre: f32, dx: f32, dy: f32, low: f32, (ox, oy, e): (L, L, L)) -> L::Bits {
-    let straight = ox * L::splat(dx * FIXED) + oy * L::splat(dy * FIXED);
-    let at = L::splat(centre * FIXED + low) + straight * (L::splat(1.0) - e);
-    at.max(L::splat(0.0)).truncated()
-}
-
-/// Offsets of the first texels of vectors from the window's centre: two columns of it, from top to bottom.
-const CORNER_X: Row = corner_offsets(true);
-const CORNER_Y: Row = corner_offsets(false);
-
-const fn corner_offsets(columns: bool) -> Row {
-    let mut out = [0.0; TILE_W];
-    let mut i = 0;
-    while i < TILE_W {
-        out[i] =
-            if columns { (i / STEPS * COLUMNS) as f32 - HALF.0 } else { (i % STEPS * 2) as f32 - HALF.1 };
-        i += 1;
-    }
-    out
-}
-
-/// How far source pixels of eight columns of two rows can be from the first one, one coordinate.
-struct Footprint {
-    low: f32,
-    high: f32,
-}
-
-impl Footprint {
-    /// Of `centre + (ox·dx + oy·dy)·(1 − e)`.
-    #[inline(always)]
-    fn of(m: &Warp, dx: f32, dy: f32) -> Self {
-        let (zx, zy) = (m.z_dx.abs(), m.z_dy.abs());
-        let (e, far) = (zx * HALF.0 + zy * HALF.1, dx.abs() * HALF.0 + dy.abs() * HALF.1);
-        let (bend_x, bend_y) = (dx.abs() * e + far * zx, dy.abs() * e + far * zy);
-        let reach = (COLUMNS - 1) as f32;
-        Footprint {
-            low: reach * (dx - bend_x).min(0.0) + (dy - bend_y).min(0.0),
-            high: reach * (dx + bend_x).max(0.0) + (dy + bend_y).max(0.0),
-        }
-    }
-
-    #[inline(always)]
-    fn extent(&self) -> f32 {
-        self.high - self.low + SLACK
-    }
-
-    #[inline(always)]
-    fn low_fixed(&self) -> f32 {
-        (self.low - 0.5 * SLACK) * FIXED
-    }
-
-    /// Rows of sixteen source pixels that hold sixteen texels and their neighbours: 4, 8, or 0 if they do not.
-    #[inline(always)]
-    fn rows<L: Lanes>(m: &Warp) -> usize {
-        if !L::LOOKUP || Footprint::of(m, m.du_dx, m.du_dy).extent() > 14.0 {
-            return 0;
-        }
-        match Footprint::of(m, m.dv_dx, m.dv_dy).extent() {
-            rows if rows < 2.0 => 4,
-            rows if rows < 6.0 => 8,
-            _ => 0,
-        }
     }
 }
 
