@@ -127,7 +127,7 @@ pub struct DensifyJob {
 }
 
 /// "Depth Diff Threshold" that holds together what is no scrap.
-const SCRAP_DEPTH_DIFF: f32 = 0.006;
+const SCRAP_DEPTH_DIFF: f32 = 0.005;
 
 /// Which filters run on the depth maps.
 #[derive(Clone, Copy, Debug, PartialEq)]

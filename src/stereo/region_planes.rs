@@ -159,7 +159,7 @@ mod tests {
     use crate::geometry::Camera;
     use crate::scene::{DepthEstimate, Grid};
     use crate::semantics::{PlanarRegion, PlanePrior};
-    use crate::stereo::tests::{Surface, images, problem, problem_of, slanted, sphere_before_wall};
+    use crate::stereo::tests::{SEEDS, Surface, images, problem, problem_of, slanted, sphere_before_wall};
     use crate::stereo::{CpuLevel, ReferenceImage, StereoOptions, StereoProblem, estimate};
     use nalgebra::Vector3;
 
@@ -181,7 +181,11 @@ mod tests {
     }
 
     fn run(problem: &StereoProblem) -> DepthEstimate {
-        let options = StereoOptions { geometric_iterations: 0, ..StereoOptions::default() };
+        run_seeded(problem, 0)
+    }
+
+    fn run_seeded(problem: &StereoProblem, seed: u64) -> DepthEstimate {
+        let options = StereoOptions { geometric_iterations: 0, seed, ..StereoOptions::default() };
         estimate(problem, &options, CpuLevel::detect()).unwrap()
     }
 
@@ -225,8 +229,12 @@ mod tests {
     #[test]
     fn what_matches_well_elsewhere_is_left_where_it_is() {
         let (problem, truth) = problem(sphere_before_wall, 0);
-        let (without, with) = (run(&problem), run(&with_region(problem)));
-        let (before, after) = (right(&without, &truth), right(&with, &truth));
-        assert!(after > before - 0.015, "{before} {after}");
+        let mean = |problem: &StereoProblem| {
+            let shares = SEEDS.map(|seed| right(&run_seeded(problem, seed), &truth));
+            shares.iter().sum::<f64>() / shares.len() as f64
+        };
+        let before = mean(&problem);
+        let after = mean(&with_region(problem));
+        assert!(after > before - 0.0125, "{before} {after}");
     }
 }

@@ -107,6 +107,10 @@ pub(in crate::stereo) fn problem_of(
     (problem, depth)
 }
 
+/// One seed moves the share of the sphere that is right by up to a percent, as half of what is wrong is its rim: the mean
+/// of three is asked for.
+pub(in crate::stereo) const SEEDS: [u64; 3] = [0, 1, 2];
+
 /// Share of the pixels whose depth is right.
 fn share_right(estimate: &DepthEstimate, truth: &Grid<f32>) -> f64 {
     let near = |(d, t): (&f32, &f32)| *d > 0.0 && (d - t).abs() < RIGHT * t;
@@ -132,8 +136,14 @@ fn a_slanted_plane_is_found_with_its_normal() {
 
 #[test]
 fn a_sphere_before_a_wall_is_found() {
-    let (e, truth) = run(sphere_before_wall);
-    assert!(share_right(&e, &truth) > 0.89, "{}", share_right(&e, &truth));
+    let (problem, truth) = problem(sphere_before_wall, 0);
+    let share = |seed| {
+        let options = StereoOptions { geometric_iterations: 0, seed, ..StereoOptions::default() };
+        share_right(&estimate(&problem, &options, CpuLevel::detect()).unwrap(), &truth)
+    };
+    let shares = SEEDS.map(share);
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    assert!(mean > 0.89, "{shares:?}");
 }
 
 #[test]
