@@ -4,9 +4,9 @@ use super::{Lanes, cut};
 use crate::stereo::level::{Level, STEPS, Weighting};
 use crate::stereo::tile::{Patch, REACH, TAP_COLUMNS, TAPS, TILE_H, TILE_W, Tile, WIN_H, WIN_W, WinRow};
 
-/// The largest weight as a 16-bit number.
-const FULL_WEIGHT: f32 = 32_767.0;
-/// What a 16-bit weight counts in units of products, as [`Lanes::scaled`] multiplies.
+/// Its 64th power is 32,767, the largest weight as a 16-bit number.
+const ROOT_OF_FULL_WEIGHT: f32 = 1.176_396_4;
+/// What a 16-bit weight counts in units of products, as [`Pairs::scaled`](super::Pairs::scaled) multiplies.
 const WEIGHT_UNIT: f32 = 1.0 / 32_768.0;
 /// Rows of a matching window.
 const WINDOW_ROWS: usize = TAP_COLUMNS;
@@ -54,7 +54,7 @@ fn row<L: Lanes, const INTERIOR: bool>(
     weighting: Weighting,
     y: usize,
 ) {
-    let grey = L::splat(weighting.grey / (STEPS * STEPS));
+    let grey = L::splat(weighting.grey / (STEPS * STEPS) * (ROOT_OF_FULL_WEIGHT / 64.0));
     let centre: L = cut(&patch.texel[y + REACH], REACH);
     let [mut sum, mut first, mut second] = [L::splat(0.0); 3];
     for pair in 0..TAPS {
@@ -65,13 +65,12 @@ fn row<L: Lanes, const INTERIOR: bool>(
             let (dy, dx) = (i as f32 - REACH as f32, j as f32 - REACH as f32);
             let t: L = cut(&patch.texel[y + i], j);
             let d = t - centre;
-            let away = d * d * grey + L::splat((dx * dx + dy * dy) * weighting.space);
-            let mut w = L::bell64(away);
+            let away = (dx * dx + dy * dy) * weighting.space * (1.0 / 64.0);
+            let mut w = L::bell64_of(L::splat(ROOT_OF_FULL_WEIGHT * (1.0 - away)) - d * d * grey);
             if !INTERIOR {
                 w = w * cut(&inside[y + i], j);
             }
-            *half = (w * L::splat(FULL_WEIGHT) + L::splat(0.5)).truncated();
-            let w = L::from_whole(*half) * L::splat(WEIGHT_UNIT);
+            *half = (w + L::splat(0.5)).truncated();
             let wt = w * t;
             sum = sum + w;
             first = first + wt;
@@ -85,9 +84,9 @@ fn row<L: Lanes, const INTERIOR: bool>(
     }
     let inverse = L::splat(1.0) / sum.max(L::splat(1e-12));
     let mean = first * inverse;
-    inverse.store(&mut patch.inverse_weight[y]);
+    (inverse * L::splat(1.0 / WEIGHT_UNIT)).store(&mut patch.inverse_weight[y]);
     mean.store(&mut patch.mean[y]);
-    (second - first * mean).max(L::splat(0.0)).store(&mut patch.norm[y]);
+    ((second - first * mean).max(L::splat(0.0)) * L::splat(WEIGHT_UNIT)).store(&mut patch.norm[y]);
 }
 
 /// Packs window row `y` with the one two rows below it.
