@@ -166,11 +166,15 @@ fn any_scale_rotation_and_offset_gives_the_same_quality() {
     }
 }
 
+/// Coordinates that are rounded otherwise lead estimation along other random paths, as other seeds do: over eight seeds F1 of
+/// this scene scatters by 0.0016 where it is and by 0.003 far away, with the same mean. Three times that of a difference.
+const SCATTER: f64 = 0.01;
+
 #[track_caller]
 fn check(what: &str, (points, f1): (usize, f64), (found, found_f1): (usize, f64)) {
     println!("{what}: {found} points, F1 {found_f1:.4}; {points} and {f1:.4} as it was");
     assert!(found.abs_diff(points) * 100 <= points, "{what}: {found} points, {points} as it was");
-    assert!((f1 - found_f1).abs() <= 0.005, "{what}: F1 {found_f1}, {f1} as it was");
+    assert!((f1 - found_f1).abs() <= SCATTER, "{what}: F1 {found_f1}, {f1} as it was");
 }
 
 #[test]
