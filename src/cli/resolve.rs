@@ -129,7 +129,7 @@ impl<'a> Resolver<'a> {
     ///
     /// # Errors
     /// Values out of range.
-    pub(crate) fn stereo(&self, default: Quality) -> Result<StereoOptions> {
+    pub(crate) fn stereo(&self, default: Quality, filter: &FilterJob) -> Result<StereoOptions> {
         let typed = &self.options.estimation;
         let own = StereoOptions::of(typed.quality.map_or(default, Quality::from));
         let (config, openmvs) = (&self.config, DenseConfig::default());
@@ -137,7 +137,11 @@ impl<'a> Resolver<'a> {
             levels: typed.sub_resolution_levels,
             iterations: typed.iters,
             geometric_iterations: typed.geometric_iters,
-            keep_cost: asked(config.ncc_threshold_keep, openmvs.ncc_threshold_keep, own.keep_cost),
+            keep_cost: asked(
+                config.ncc_threshold_keep,
+                openmvs.ncc_threshold_keep,
+                filter.keep_cost(own.keep_cost),
+            ),
             geometric_weight: asked(config.geometric_weight, openmvs.geometric_weight, own.geometric_weight),
             ..own
         };

@@ -1,6 +1,6 @@
 //! Depth maps of all views: photometric estimation, then passes that make them agree.
 
-use super::job::FilterJob;
+use super::filter_job::FilterJob;
 use super::prepare::Prepared;
 use super::problem::stereo_problem;
 use super::record::with_threads;

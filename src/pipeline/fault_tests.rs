@@ -1,7 +1,8 @@
 //! Whole runs over media that fail: one clear error, nothing lost, and the next run ends as if nothing had been.
 
 use super::densify::densify;
-use super::job::{AcrossViews, DensifyJob, FilterJob, Outputs, RoiJob, SceneJob};
+use super::filter_job::{AcrossViews, FilterJob};
+use super::job::{DensifyJob, Outputs, RoiJob, SceneJob};
 use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 use crate::fusion::FusionOptions;

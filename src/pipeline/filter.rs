@@ -1,7 +1,7 @@
 //! The filter across views: every depth is held against the maps of the neighbours.
 
 use super::estimate::for_each_view;
-use super::job::AcrossViews;
+use super::filter_job::AcrossViews;
 use super::prepare::Prepared;
 use super::resume::Plan;
 use crate::depth_filter::{

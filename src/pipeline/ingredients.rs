@@ -1,7 +1,7 @@
 //! What decides the bytes of every depth map, as digests: two maps with the same key are the same map.
 
 use super::filter::neighbors_of_filter;
-use super::job::FilterJob;
+use super::filter_job::FilterJob;
 use super::prepare::Prepared;
 use super::problem::sparse_points;
 use super::skip::{Labels, planar, skipped};

@@ -14,6 +14,7 @@ mod export_rasters;
 #[cfg(test)]
 mod fault_tests;
 mod filter;
+mod filter_job;
 mod finished;
 mod forecast;
 mod fuse;
@@ -50,12 +51,13 @@ pub use evaluate::{EvaluateJob, evaluate};
 pub use export::{ExportSceneJob, SceneExport, export_scene};
 pub use export_colmap::{ExportColmapJob, export_colmap};
 pub use export_rasters::{ExportRastersJob, Planes, export_rasters};
+pub use filter_job::{AcrossViews, FilterJob};
 pub use finished::{CloudJob, CloudWork, finished_cloud};
 pub use fuse::fuse;
 pub use import::{ImportDepthsJob, ImportSceneJob, import_depths, import_scene};
 pub use job::{
-    AcrossViews, DensifyJob, DepthMapsJob, FilterJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob,
-    SceneArchive, SceneJob, TowerJob, TowerWork,
+    DensifyJob, DepthMapsJob, FuseJob, LabelJob, MaskJob, Outputs, RoiJob, SceneArchive, SceneJob, TowerJob,
+    TowerWork,
 };
 pub use labels_check::{CheckLabelsJob, check_labels};
 pub use labels_render::{RenderLabelsJob, RenderedView, render_label_maps};

@@ -38,7 +38,7 @@ fn a_second_run_makes_only_what_has_changed() {
     let said = run("--quality draft");
     assert!(said.contains("6 depth maps exist") && said.contains("estimation options"), "{said}");
     let said = run("--quality draft --filter openmvs");
-    assert!(said.contains("other values of: filter across views,"), "{said}");
+    assert!(said.contains("estimation options, filter across views,"), "{said}");
     // Back again.
     run("");
     assert_eq!(results(&scratch), first);

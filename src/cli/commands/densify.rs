@@ -58,14 +58,15 @@ fn job(args: &DensifyArgs, typed: &ArgMatches, resolver: &Resolver<'_>) -> Resul
             )));
         }
     };
+    let filter = resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?;
     Ok(DensifyJob {
         input: resolver.scene(args.scene.clone(), folder.clone())?,
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder },
         force: shared.run.force,
         pictures: false,
-        stereo: resolver.stereo(Quality::Normal)?,
-        filter: resolver.filter(is_typed(typed, "postprocess-dmaps"), FilterKind::Unbiased)?,
+        stereo: resolver.stereo(Quality::Normal, &filter)?,
+        filter,
         depth_maps_only,
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion(Support::All, agreeing_on_class(typed))?,

@@ -169,14 +169,15 @@ fn job(typing: &Typing, folder: &Path, input: PathBuf, resolver: &Resolver<'_>) 
         }
     }
     let outputs = &shared.labels.output;
+    let filter = resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?;
     Ok(DensifyJob {
         input: scene,
         resolution: resolver.resolution()?,
         depth_maps: if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() },
         force: shared.run.force,
         pictures: args.verbosity >= PICTURES,
-        stereo: resolver.stereo(Quality::High)?,
-        filter: resolver.filter(strict || typing.has("postprocess-dmaps"), FilterKind::Openmvs)?,
+        stereo: resolver.stereo(Quality::High, &filter)?,
+        filter,
         depth_maps_only: shared.estimation.fusion_mode == 1,
         remove_depth_maps: shared.fusion.remove_dmaps,
         fusion: resolver.fusion(Support::Unclaimed, None)?,
