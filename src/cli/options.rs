@@ -117,7 +117,7 @@ pub(crate) struct FusionOptions {
 /// `--filter`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum QualityName {
-    /// for a look: about 0.6 of the normal time
+    /// for a look: about two thirds of the normal time
     Draft,
     /// depth maps that match OpenMVS's
     Normal,

@@ -6,7 +6,7 @@ use crate::{Error, Result};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Quality {
-    /// For a look: about 0.6 of the normal time.
+    /// For a look: about two thirds of the normal time.
     Draft,
     /// What matches OpenMVS's depth maps.
     #[default]
