@@ -11,7 +11,7 @@ use crate::stereo::{CpuLevel, StereoOptions};
 use std::time::Duration;
 
 /// Processor seconds per pixel and pass over it, at normal quality with the AVX-512 kernels.
-const PASS: f64 = 0.42e-6;
+const PASS: f64 = 0.33e-6;
 /// Share of that without any source view, and what each source view adds to it; five make the whole.
 const BY_SOURCES: (f64, f64) = (0.42, 0.116);
 /// Passes as long as a geometric one is: it compares one view more.
@@ -26,14 +26,15 @@ const SPEEDUP: f64 = 0.85;
 fn slowness(cpu: CpuLevel) -> f64 {
     match cpu {
         CpuLevel::Avx512 => 1.0,
-        CpuLevel::Avx2 => 1.2,
-        CpuLevel::Neon | CpuLevel::Scalar => 2.2,
+        CpuLevel::Avx2 => 1.3,
+        CpuLevel::Neon | CpuLevel::Scalar => 2.3,
     }
 }
 
-/// Time of a quality relative to the normal one: draft 0.6, high 1.5.
+/// Time of a quality relative to the normal one: draft 0.7, high 1.5.
 fn effort(options: &StereoOptions) -> f64 {
-    0.2 + 0.08 * f64::from(options.candidates + options.refinements)
+    let compared = (options.candidates + options.refinements) * options.compared_views;
+    0.59 + 0.0091 * f64::from(compared)
 }
 
 /// Passes over all pixels that the photometric stage is as long as: coarser levels have fewer pixels.
@@ -174,25 +175,25 @@ mod tests {
         );
     }
 
-    /// Processor seconds of whole runs in `docs/benchmarks.md`: the model is within a factor of two.
+    /// Processor seconds of whole runs in `docs/benchmarks.md`: the model is within a quarter on the machine it is fitted to.
     #[test]
     fn measured_runs_are_met() {
         for (measured, maps, pixels, sources, cpu) in [
-            (11.7, 16, 600.0 * 450.0, 5, CpuLevel::Avx512),
-            (13.6, 16, 600.0 * 450.0, 5, CpuLevel::Avx2),
-            (23.3, 16, 600.0 * 450.0, 5, CpuLevel::Scalar),
-            (11.1, 11, 768.0 * 512.0, 5, CpuLevel::Avx512),
-            (47.7, 11, 1536.0 * 1024.0, 5, CpuLevel::Avx512),
-            (2.31, 6, 400.0 * 300.0, 5, CpuLevel::Avx512),
-            (0.48, 6, 200.0 * 150.0, 2, CpuLevel::Avx512),
-            (25.73, 258, 200.0 * 150.0, 5, CpuLevel::Avx512),
+            (9.3, 16, 600.0 * 450.0, 5, CpuLevel::Avx512),
+            (11.6, 16, 600.0 * 450.0, 5, CpuLevel::Avx2),
+            (19.4, 16, 600.0 * 450.0, 5, CpuLevel::Scalar),
+            (9.1, 11, 768.0 * 512.0, 5, CpuLevel::Avx512),
+            (38.6, 11, 1536.0 * 1024.0, 5, CpuLevel::Avx512),
+            (1.47, 6, 400.0 * 300.0, 5, CpuLevel::Avx512),
+            (0.33, 6, 200.0 * 150.0, 2, CpuLevel::Avx512),
+            (18.95, 258, 200.0 * 150.0, 5, CpuLevel::Avx512),
         ] {
             let side = f64::sqrt(pixels);
             let rest = f64::from(maps) * pixels * (FILTER + FUSION);
             let said = seconds(maps as usize, side, sources, &StereoOptions::default(), cpu) + rest;
             let ratio = said / measured;
             println!("{measured} s measured, {said:.2} s said");
-            assert!((0.5..2.0).contains(&ratio), "{measured} s measured, {said:.2} s said");
+            assert!((0.8..1.25).contains(&ratio), "{measured} s measured, {said:.2} s said");
         }
     }
 }
