@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 /// "Depth Diff Threshold" that holds together what is no scrap.
 const SCRAP_DEPTH_DIFF: f32 = 0.005;
 
-/// Matching cost from which agreement says little: where the unbiased filter's `min_confidence` is.
-const COUNTED_COST: f32 = 0.64;
+/// Matching cost from which agreement says little. On the rendered façade 0.7 leaves a fifth of the gross errors, mostly of clouds in the
+/// sky, and 0.64 an eighth; on photographs the one costs 3 % of the points, the other 4 %.
+const COUNTED_COST: f32 = 0.7;
 
 /// Which filters run on the depth maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
