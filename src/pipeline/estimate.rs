@@ -1,10 +1,13 @@
-//! Depth maps of all views: photometric estimation, then passes that make them agree.
+//! Depth maps of all views: photometric estimation, then passes that make them agree, a view ahead of another where it can.
 
 use super::filter_job::FilterJob;
+use super::ingredients::Recipe;
+use super::ordered_steps::OrderedSteps;
 use super::prepare::Prepared;
 use super::problem::stereo_problem;
 use super::record::with_threads;
 use super::resume::Plan;
+use super::schedule::{Schedule, Task};
 use crate::depth_filter::{fill_gaps, remove_speckles};
 use crate::error::{Error, Result};
 use crate::progress::{Event, Progress, Stage};
@@ -17,6 +20,9 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Planes of the depth map of a view after a stage.
+type PlaneCache = ByteCache<(u32, ViewIndex), SourcePlanes>;
 
 /// What estimation needs to know besides the scene.
 pub(super) struct Estimation<'a> {
@@ -64,16 +70,36 @@ impl Estimation<'_> {
     pub(super) fn run(&self) -> Result<()> {
         let passes = self.options.geometric_iterations;
         self.require_memory(self.plan.todo(0))?;
-        let (given, estimated): (Vec<ViewIndex>, Vec<ViewIndex>) =
-            self.plan.todo(0).iter().partition(|view| self.plan.given.contains(view));
-        self.photometric(&estimated, passes == 0)?;
-        self.clean_given(&given)?;
-        self.plan.complete(self.store, 0);
-        for pass in 1..=passes {
-            self.geometric(pass, pass == passes)?;
-            self.plan.complete(self.store, pass);
+        let todo = |stage| self.plan.todo(stage);
+        let recipe = Recipe { prepared: self.prepared, options: self.options, filter: self.filter };
+        let schedule = Schedule::new(passes + 1, todo, |task| self.plan.needs(recipe, task));
+        let estimated = todo(0).iter().filter(|view| !self.plan.given.contains(view)).count();
+        let stages = (0..=passes)
+            .map(|stage| (self.stage(stage), if stage == 0 { estimated } else { todo(stage).len() }));
+        let steps = OrderedSteps::start(self.progress, stages);
+        let planes = ByteCache::new(self.planes);
+        let work = |task: Task| {
+            self.progress.check()?;
+            match task {
+                Task { stage: 0, view } if self.plan.given.contains(&view) => return self.clean_given(view),
+                Task { stage: 0, view } => self.photometric(view)?,
+                task => self.geometric(task, &planes)?,
+            }
+            steps.step(self.stage(task.stage));
+            Ok(())
+        };
+        let all = || schedule.run(work, |stage| self.plan.complete(self.store, stage));
+        at_a_time(self.at_once, all)
+    }
+
+    /// What listeners are told of stage `stage`.
+    fn stage(&self, stage: u32) -> Stage {
+        match stage.checked_sub(1) {
+            None => Stage::Estimate,
+            Some(pass) => {
+                Stage::Geometric { pass: pass as usize, passes: self.options.geometric_iterations as usize }
+            }
         }
-        Ok(())
     }
 
     /// Asks whether there is memory for the views that are worked on at a time: their images and planes, and no more, so
@@ -91,70 +117,51 @@ impl Estimation<'_> {
         memory::require(at_a_time as u64, "estimating as many depth maps at a time as there are threads")
     }
 
-    fn photometric(&self, todo: &[ViewIndex], last: bool) -> Result<()> {
-        if todo.is_empty() {
-            return Ok(());
-        }
-        let steps = self.progress.start(Stage::Estimate, todo.len());
-        for_each_view(todo, self.at_once, self.progress, |view| {
-            let start = Instant::now();
-            let problem = stereo_problem(self.prepared, view, self.options.levels)?;
-            let mut estimate = stereo::estimate(&problem, self.options, self.cpu)?;
-            self.clean(&mut estimate, last);
-            let (reference, size) = (estimate.image_id, estimate.depth.size());
-            self.plan.write(self.store, view, 0, estimate)?;
-            self.progress.event(Event::DepthEstimated {
-                reference,
-                sources: problem.sources.len(),
-                size: (size.width, size.height),
-                elapsed: start.elapsed(),
-            });
-            steps.step();
-            Ok(())
-        })
+    fn photometric(&self, view: ViewIndex) -> Result<()> {
+        let start = Instant::now();
+        let problem = stereo_problem(self.prepared, view, self.options.levels)?;
+        let mut estimate = stereo::estimate(&problem, self.options, self.cpu)?;
+        self.clean(&mut estimate, self.options.geometric_iterations == 0);
+        let (reference, size) = (estimate.image_id, estimate.depth.size());
+        self.plan.write(self.store, view, 0, estimate)?;
+        self.progress.event(Event::DepthEstimated {
+            reference,
+            sources: problem.sources.len(),
+            size: (size.width, size.height),
+            elapsed: start.elapsed(),
+        });
+        Ok(())
     }
 
-    /// The geometric pass that is stage `stage`: every view reads the maps of the stage before.
-    fn geometric(&self, stage: u32, last: bool) -> Result<()> {
-        let todo = self.plan.todo(stage);
-        if todo.is_empty() {
-            return Ok(());
-        }
-        let (pass, passes) = (stage as usize - 1, self.options.geometric_iterations as usize);
-        let steps = self.progress.start(Stage::Geometric { pass, passes }, todo.len());
-        let planes = ByteCache::new(self.planes);
-        for_each_view(todo, self.at_once, self.progress, |view| {
-            let problem = stereo_problem(self.prepared, view, self.options.levels)?;
-            let before = |view| self.plan.read(self.store, view, stage - 1);
-            let previous = before(view)?;
-            let refined = |view| self.plan.is_refined(self.prepared, view);
-            let sources = self.prepared.neighbors[view.index()].matching().iter();
-            let planes_of = |view| {
-                planes.get_or_load(view, || {
-                    let planes = SourcePlanes::new(&*before(view)?);
-                    let bytes = planes.bytes();
-                    Ok((planes, bytes))
-                })
-            };
-            let sources = sources
-                .map(|source| refined(source.view).then(|| planes_of(source.view)).transpose())
-                .collect::<Result<Vec<Option<Arc<SourcePlanes>>>>>()?;
-            let mut estimate =
-                stereo::refine_geometric(&problem, &previous, &sources, pass, self.options, self.cpu)?;
-            self.clean(&mut estimate, last);
-            self.plan.write(self.store, view, stage, estimate)?;
-            steps.step();
-            Ok(())
-        })
+    /// A geometric pass over a view, which reads the maps of the stage before.
+    fn geometric(&self, Task { stage, view }: Task, planes: &PlaneCache) -> Result<()> {
+        let before = stage - 1;
+        let problem = stereo_problem(self.prepared, view, self.options.levels)?;
+        let previous = self.plan.read(self.store, view, before)?;
+        let refined = |view| self.plan.is_refined(self.prepared, view);
+        let sources = self.prepared.neighbors[view.index()].matching().iter();
+        let planes_of = |view| {
+            planes.get_or_load((before, view), || {
+                let planes = SourcePlanes::new(&*self.plan.read(self.store, view, before)?);
+                let bytes = planes.bytes();
+                Ok((planes, bytes))
+            })
+        };
+        let sources = sources
+            .map(|source| refined(source.view).then(|| planes_of(source.view)).transpose())
+            .collect::<Result<Vec<Option<Arc<SourcePlanes>>>>>()?;
+        let (pass, last) = (before as usize, stage == self.options.geometric_iterations);
+        let mut estimate =
+            stereo::refine_geometric(&problem, &previous, &sources, pass, self.options, self.cpu)?;
+        self.clean(&mut estimate, last);
+        self.plan.write(self.store, view, stage, estimate)
     }
 
-    fn clean_given(&self, views: &[ViewIndex]) -> Result<()> {
-        for_each_view(views, self.at_once, self.progress, |view| {
-            let mut estimate = DepthEstimate::clone(&*self.store.read(self.prepared.id(view))?);
-            estimate.image_name.clone_from(&self.prepared.loaded.scene.views[view.index()].name);
-            self.clean(&mut estimate, true);
-            self.plan.write(self.store, view, 0, estimate)
-        })
+    fn clean_given(&self, view: ViewIndex) -> Result<()> {
+        let mut estimate = DepthEstimate::clone(&*self.store.read(self.prepared.id(view))?);
+        estimate.image_name.clone_from(&self.prepared.loaded.scene.views[view.index()].name);
+        self.clean(&mut estimate, true);
+        self.plan.write(self.store, view, 0, estimate)
     }
 
     fn clean(&self, estimate: &mut DepthEstimate, last: bool) {
@@ -184,5 +191,10 @@ pub(super) fn for_each_view(
             work(view)
         })
     };
+    at_a_time(at_once, all)
+}
+
+/// Does `all` with `at_once` threads or as many as the pool has.
+fn at_a_time(at_once: usize, all: impl FnOnce() -> Result<()> + Send) -> Result<()> {
     if at_once < rayon::current_num_threads() { with_threads(at_once, all) } else { all() }
 }

@@ -3,6 +3,7 @@
 use super::ingredients::{Ingredients, Recipe, ingredients};
 use super::memory_plan::MAP_BYTES;
 use super::prepare::Prepared;
+use super::schedule::Task;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::{DepthEstimate, ImageId, ViewIndex};
@@ -269,6 +270,16 @@ impl Plan {
         self.views.binary_search(&view).ok()
     }
 
+    /// What makes the maps that `task` reads, where they are not there.
+    pub(super) fn needs(&self, recipe: Recipe<'_>, task: Task) -> Vec<Task> {
+        let Some(before) = task.stage.checked_sub(1) else { return Vec::new() };
+        let made_by = |view: ViewIndex| match self.places[self.at(view)?][before as usize] {
+            MapStage::Pass(stage) => Some(Task { stage, view }),
+            MapStage::Final => None,
+        };
+        recipe.inputs(task.view, task.stage, &self.views).into_iter().filter_map(made_by).collect()
+    }
+
     /// Views of which `stage` makes a map, ascending.
     pub(super) fn todo(&self, stage: u32) -> &[ViewIndex] {
         &self.todo[stage as usize]
@@ -279,7 +290,8 @@ impl Plan {
         self.todo.iter().any(|views| !views.is_empty())
     }
 
-    /// Bytes that the maps to be made take on the disk at most: those of two stages, as one is made from the other.
+    /// Bytes that the maps to be made take on the disk: those of two stages, as one is made from the other, and one for every
+    /// thread that goes on to the stage after them while their last maps are in hand.
     pub(super) fn disk_bytes(&self, prepared: &Prepared) -> u64 {
         let bytes_of = |view: &ViewIndex| match &prepared.cameras[view.index()] {
             Some(camera) => camera.size().area() as u64 * MAP_BYTES,
@@ -287,7 +299,9 @@ impl Plan {
         };
         let stages: Vec<u64> = self.todo.iter().map(|views| views.iter().map(bytes_of).sum()).collect();
         let pairs = stages.windows(2).map(|pair| pair[0] + pair[1]);
-        pairs.chain(stages.first().copied()).max().unwrap_or(0)
+        let two = pairs.chain(stages.first().copied()).max().unwrap_or(0);
+        let largest = self.views.iter().map(bytes_of).max().unwrap_or(0);
+        (two + largest * rayon::current_num_threads() as u64).min(stages.iter().sum())
     }
 
     /// Views whose maps were there.
