@@ -4,7 +4,7 @@ use super::plane::Pinhole;
 use super::problem::StereoProblem;
 use super::source_planes::SourcePlanes;
 use super::texels::{Texels, halved};
-use super::tile::{REACH, TILE_W, WIN_W};
+use super::tile::{REACH, Row, TILE_W, WIN_W};
 use crate::geometry::{Camera, Size};
 use crate::scene::{GrayImage, LabelMap};
 use crate::semantics::nearest_labels;
@@ -65,6 +65,15 @@ pub(crate) struct Source {
     pub(crate) geometry: Option<SourceGeometry>,
 }
 
+/// What takes reference pixels and inverse depths into up to sixteen sources, a lane each: `a` and `b` of [`Source`].
+pub(crate) struct Transfers {
+    pub(crate) a: [[Row; 3]; 3],
+    pub(crate) b: [Row; 3],
+    /// Last column and row where bilinear samples have all their neighbours and one pixel to spare; below 1 where there is no
+    /// such source.
+    pub(crate) last: [Row; 2],
+}
+
 /// The depth map of a source view as planes of inverse depth, and the way into it.
 pub(crate) struct SourceGeometry {
     pub(crate) width: usize,
@@ -83,6 +92,8 @@ pub(crate) struct Level {
     pub(crate) pinhole: Pinhole,
     pub(crate) reference: Reference,
     pub(crate) sources: Vec<Source>,
+    /// Of the first sixteen sources, of the next sixteen, and so on.
+    pub(crate) transfers: Vec<Transfers>,
     /// Smallest and largest inverse depth allowed.
     pub(crate) w_range: (f32, f32),
     /// Largest shift in any source, in pixels, per unit of inverse depth, at the image centre.
@@ -146,8 +157,9 @@ impl Level {
                     geometry: None,
                 })
             })
-            .collect();
+            .collect::<Vec<Source>>();
         Level {
+            transfers: sources.chunks(TILE_W).map(Transfers::new).collect(),
             size: camera.size(),
             pinhole,
             reference: Reference::new(&gray),
@@ -232,15 +244,33 @@ fn typical_inverse_depth(problem: &StereoProblem) -> f32 {
 }
 
 impl Source {
-    /// The grey level at the pixel of `(u, v)`, or the nearest one, as a base of [`Lanes::bilinear`].
+    /// The grey level at a pixel, or the nearest one, as a base of [`Lanes::bilinear`].
     ///
     /// [`Lanes::bilinear`]: super::cost::lanes::Lanes::bilinear
     #[inline(always)]
-    pub(crate) fn level_at(&self, u: f32, v: f32) -> u32 {
-        let x = (u.max(0.0) as usize).min(self.width - 1);
-        let y = (v.max(0.0) as usize).min(self.height - 1);
+    pub(crate) fn level_at(&self, x: u32, y: u32) -> u32 {
+        let (x, y) = ((x as usize).min(self.width - 1), (y as usize).min(self.height - 1));
         let level = self.bytes.get(y * self.width + x).copied().unwrap_or(0) as i8;
         (i32::from(level) * 255 * 255) as u32
+    }
+}
+
+impl Transfers {
+    /// Of up to sixteen sources.
+    fn new(sources: &[Source]) -> Self {
+        let none: Row = [0.0; TILE_W];
+        let mut out = Transfers { a: [[none; 3]; 3], b: [none; 3], last: [none; 2] };
+        for (lane, source) in sources.iter().enumerate() {
+            for row in 0..3 {
+                for column in 0..3 {
+                    out.a[row][column][lane] = source.a[row][column];
+                }
+                out.b[row][lane] = source.b[row];
+            }
+            out.last[0][lane] = source.width as f32 - 2.0;
+            out.last[1][lane] = source.height as f32 - 2.0;
+        }
+        out
     }
 }
 

@@ -3,6 +3,7 @@
 //! All pixels of a tile test the same plane, so that the source window is warped once for all of them
 //! (Lu et al. 2013, PatchMatch Filter; Taniai et al. 2018, local expansion moves).
 
+use super::cost::Homographies;
 use super::level::Level;
 use super::plane::InversePlane;
 use super::state::State;
@@ -40,8 +41,10 @@ pub(crate) type Words = [u32; TILE_W];
 pub(crate) type WinWords = [u32; WIN_W];
 /// One value per pixel of the tile.
 pub(crate) type TileMap = [Row; TILE_H];
-/// One value per pixel of the tile and its one-pixel surround: pixel (x, y) is at `[y + 1][x + 1]`.
-pub(crate) type HaloMap = [WinRow; TILE_H + 2];
+/// Where in its row of a [`HaloMap`] the tile begins: whole vectors are aligned there.
+pub(crate) const HALO_X: usize = TILE_W;
+/// One value per pixel of the tile and its one-pixel surround: pixel (x, y) is at `[y + 1][HALO_X + x]`.
+pub(crate) type HaloMap = [[f32; 3 * TILE_W]; TILE_H + 2];
 
 /// The reference window and the statistics of every pixel's patch.
 #[repr(align(64))]
@@ -81,10 +84,10 @@ pub(crate) struct Belief {
     pub(crate) active: TileMap,
 }
 
-/// Planes of the tile's pixels and their surround, as unit normals and inverse depths.
+/// Planes of the tile's pixels and their surround, as vectors of one length and inverse depths.
 #[repr(align(64))]
 pub(crate) struct Halo {
-    /// First component of the unit plane vector.
+    /// First component of the plane vector.
     pub(crate) nx: HaloMap,
     /// Second component.
     pub(crate) ny: HaloMap,
@@ -94,7 +97,7 @@ pub(crate) struct Halo {
     pub(crate) w: HaloMap,
     /// 1 where there may be an estimate, else 0.
     pub(crate) on: HaloMap,
-    /// One over the lengths that the vectors of the tile's own pixels had.
+    /// One over the lengths that the vectors of the tile's own pixels had, scaled as the kernels of smoothness want it.
     pub(crate) inverse_length: TileMap,
     /// Smoothness factor of every pixel's own plane by the pixels to its left and right.
     pub(crate) beside: TileMap,
@@ -119,6 +122,8 @@ pub(crate) struct Sides {
 /// Scratch of one candidate.
 #[repr(align(64))]
 pub(crate) struct Scratch {
+    /// The candidate's homographies to sixteen sources.
+    pub(crate) homographies: Homographies,
     /// Source window warped by the candidate, about 1/64 grey levels from mid-grey.
     pub(crate) warped: [WinWords; WIN_H],
     /// 1 where the warped sample lies inside the source.
@@ -151,13 +156,13 @@ pub(crate) struct Tile {
     pub(crate) order: Vec<usize>,
     /// How many of them, from the first, candidates are compared with.
     pub(crate) views: usize,
-    /// Mean cost of the last candidate compared with each source.
+    /// Mean cost in each source of the last plane that was compared with all of them.
     pub(crate) view_cost: Vec<f32>,
 }
 
 const ZERO_ROW: Row = [0.0; TILE_W];
 const ZERO_TILE: TileMap = [ZERO_ROW; TILE_H];
-const ZERO_HALO: HaloMap = [[0.0; WIN_W]; TILE_H + 2];
+const ZERO_HALO: HaloMap = [[0.0; 3 * TILE_W]; TILE_H + 2];
 const ZERO_WIN: [WinRow; WIN_H] = [[0.0; WIN_W]; WIN_H];
 const ZERO_WORDS: [WinWords; WIN_H] = [[0; WIN_W]; WIN_H];
 
@@ -199,6 +204,7 @@ impl Tile {
                 sides: Sides { nx: ZERO_ROW, ny: ZERO_ROW, nz: ZERO_ROW, w: ZERO_ROW, on: ZERO_ROW },
             },
             scratch: Scratch {
+                homographies: Homographies::NONE,
                 warped: ZERO_WORDS,
                 valid: ZERO_WIN,
                 cost: ZERO_TILE,
@@ -213,7 +219,7 @@ impl Tile {
         })
     }
 
-    /// Orders the views by how well the last candidate, which all were compared with, suited them.
+    /// Orders the views by how well the last plane that was compared with all of them suited them.
     pub(crate) fn rank_views(&mut self) {
         let Tile { order, view_cost, .. } = self;
         order.sort_by(|&a, &b| view_cost[a].total_cmp(&view_cost[b]).then(a.cmp(&b)));
@@ -259,16 +265,17 @@ impl Tile {
         }
         for y in 0..TILE_H + 2 {
             let at = state.at(x0 - 1, y0 - 1 + y as i32);
-            self.halo.w[y].copy_from_slice(&state.w[at..at + WIN_W]);
-            self.halo.nx[y].copy_from_slice(&state.wx[at..at + WIN_W]);
-            self.halo.ny[y].copy_from_slice(&state.wy[at..at + WIN_W]);
-            self.halo.on[y].copy_from_slice(&state.active[at..at + WIN_W]);
+            let (from, to) = (at..at + TILE_W + 2, HALO_X - 1..HALO_X + TILE_W + 1);
+            self.halo.w[y][to.clone()].copy_from_slice(&state.w[from.clone()]);
+            self.halo.nx[y][to.clone()].copy_from_slice(&state.wx[from.clone()]);
+            self.halo.ny[y][to.clone()].copy_from_slice(&state.wy[from.clone()]);
+            self.halo.on[y][to].copy_from_slice(&state.active[from]);
         }
         let Halo { nx, ny, w, on, sides, .. } = &mut self.halo;
         for (from, to) in [(nx, &mut sides.nx), (ny, &mut sides.ny), (w, &mut sides.w), (on, &mut sides.on)] {
             for y in 0..TILE_H {
-                to[y] = from[y + 1][0];
-                to[TILE_H + y] = from[y + 1][TILE_W + 1];
+                to[y] = from[y + 1][HALO_X - 1];
+                to[TILE_H + y] = from[y + 1][HALO_X + TILE_W];
             }
         }
     }

@@ -13,6 +13,7 @@ mod x86;
 use super::level::Level;
 use super::plane::InversePlane;
 use super::tile::Tile;
+pub(crate) use kernels::Homographies;
 
 /// Lanes of what every processor of the architecture has.
 #[cfg(target_arch = "x86_64")]
@@ -99,7 +100,7 @@ pub(crate) struct Kernels {
     pub(crate) prepare: fn(&mut Tile, &Level),
     /// Unit normals of the surround and total costs of the loaded estimates.
     pub(crate) begin: fn(&mut Tile, &Level),
-    /// Compares a plane anchored at the tile's centre with the views in use, to order them.
+    /// Compares a plane anchored at the tile's centre with all views, to order them; all are in use.
     pub(crate) survey: fn(&mut Tile, &Level, InversePlane),
     /// Matching cost of every pixel's own plane over the views in use.
     pub(crate) score_own: fn(&mut Tile, &Level),

@@ -29,26 +29,34 @@ pub(super) fn accept<L: Lanes>(
     let Tile { belief, halo, scratch, .. } = tile;
     let mut changed = 0;
     let along = L::splat(p.wx) * (L::load(&LANE) - L::splat(CENTRE.0));
-    for y in 0..TILE_H {
+    let mut takers = [L::splat(0.0).lt(L::splat(0.0)); TILE_H];
+    for (y, takers) in takers.iter_mut().enumerate() {
         let data: L = merged(&scratch.best[y], &scratch.second[y]);
-        let smooth = L::load(&scratch.factor[y]);
         let w = L::splat(p.w + p.wy * (y as f32 - CENTRE.1)) + along;
-        let t = total(data, smooth, w, (L::load(&belief.prior_z[y]), L::load(&belief.prior_k[y])));
-        let old = L::load(&belief.total[y]);
+        let prior = (L::load(&belief.prior_z[y]), L::load(&belief.prior_k[y]));
+        let t = total(data, L::load(&scratch.factor[y]), w, prior);
         let possible = L::both(L::splat(low).le(w), w.le(L::splat(high)));
-        let better = L::both(t.lt(old), L::both(possible, L::splat(0.5).lt(L::load(&belief.active[y]))));
-        if L::any(better) {
-            changed |= 1 << y;
-            vector.take(halo, y, w, better);
-            L::select(better, t, old).store(&mut belief.total[y]);
-            for (row, new) in [
-                (&mut belief.data[y], data),
-                (&mut belief.w[y], w),
-                (&mut belief.wx[y], L::splat(p.wx)),
-                (&mut belief.wy[y], L::splat(p.wy)),
-            ] {
-                L::select(better, new, L::load(row)).store(row);
-            }
+        let open = L::both(possible, L::splat(0.5).lt(L::load(&belief.active[y])));
+        *takers = L::both(t.lt(L::load(&belief.total[y])), open);
+        data.store(&mut scratch.best[y]);
+        t.store(&mut scratch.cost[y]);
+        changed |= u32::from(L::any(*takers)) << y;
+    }
+    let mut rows = changed;
+    while rows != 0 {
+        let y = rows.trailing_zeros() as usize % TILE_H;
+        rows &= rows - 1;
+        let better = takers[y];
+        let w = L::splat(p.w + p.wy * (y as f32 - CENTRE.1)) + along;
+        vector.take(halo, y, w, better);
+        for (row, new) in [
+            (&mut belief.total[y], L::load(&scratch.cost[y])),
+            (&mut belief.data[y], L::load(&scratch.best[y])),
+            (&mut belief.w[y], w),
+            (&mut belief.wx[y], L::splat(p.wx)),
+            (&mut belief.wy[y], L::splat(p.wy)),
+        ] {
+            L::select(better, new, L::load(row)).store(row);
         }
     }
     changed

@@ -4,6 +4,7 @@ mod contest;
 mod corners;
 mod correlation;
 mod geometric;
+mod homographies;
 mod label;
 mod own;
 mod patch;
@@ -19,6 +20,7 @@ use crate::stereo::level::Level;
 use crate::stereo::plane::InversePlane;
 use crate::stereo::tile::{CENTRE, REACH, ROBUST_COST, Row, TILE_H, TILE_W, Tile, TileMap, UNSEEN, WinRow};
 use geometric::geometric_term;
+pub(crate) use homographies::Homographies;
 use label::label_term;
 use smoothness::PlaneVector;
 use warp::{Coverage, warp};
@@ -33,7 +35,7 @@ const PAIRS_Y: Row = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 2.5, 2.5, 2.5, 2.5
 
 /// The 16 values from column `at`.
 #[inline(always)]
-fn cut<L: Lanes>(row: &WinRow, at: usize) -> L {
+fn cut<L: Lanes>(row: &[f32], at: usize) -> L {
     L::load(row[at..].first_chunk::<TILE_W>().unwrap_or(&ZERO))
 }
 
@@ -56,7 +58,7 @@ pub(super) fn try_plane<L: Lanes>(tile: &mut Tile, level: &Level, plane: Inverse
     changed != 0
 }
 
-/// Compares a plane with the views in use, to order them.
+/// Compares a plane with all views, to order them.
 #[inline(always)]
 pub(super) fn survey<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) {
     data_cost::<L>(tile, level, plane);
@@ -69,19 +71,24 @@ fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> b
     let Tile { x0, y0, classes, patch, scratch, order, views, view_cost, .. } = tile;
     scratch.best = [[UNSEEN; TILE_W]; TILE_H];
     scratch.second = [[UNSEEN; TILE_W]; TILE_H];
-    let mut any = false;
+    // Views are only put in order by planes that all were compared with.
+    let ranks = *views >= order.len();
+    let (mut any, mut filled) = (false, usize::MAX);
     for &k in order.iter().take(*views) {
-        let source = &level.sources[k];
-        view_cost[k] = UNSEEN;
-        let coverage = warp::<L>(source, *x0, *y0, plane, scratch);
+        let (source, lanes) = (&level.sources[k], k / TILE_W);
+        if ranks {
+            view_cost[k] = UNSEEN;
+        }
+        if lanes != filled {
+            scratch.homographies.fill::<L>(&level.transfers[lanes], (*x0, *y0), plane);
+            filled = lanes;
+        }
+        let coverage = warp::<L>(source, k % TILE_W, scratch);
         if coverage == Coverage::None {
             continue;
         }
         any = true;
-        correlation::of_tile::<L>(patch, &scratch.warped, &mut scratch.cost);
-        if coverage == Coverage::Part {
-            reject_outside::<L>(&scratch.valid, &mut scratch.cost);
-        }
+        let mut terms = [L::splat(0.0); TILE_H / 2];
         if let Some(g) = &source.geometry {
             for y in (0..TILE_H).step_by(4) {
                 let (x, y_in) = (L::load(&PAIRS_X), L::load(&PAIRS_Y) + L::splat(y as f32));
@@ -89,14 +96,14 @@ fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> b
                     + L::splat(plane.wx) * (x - L::splat(CENTRE.0))
                     + L::splat(plane.wy) * (y_in - L::splat(CENTRE.1));
                 let at = (L::splat(*x0 as f32) + x, L::splat(*y0 as f32) + y_in);
-                let terms = L::doubled(geometric_term(g, at, w, level.geometric_weight));
-                for (rows, term) in scratch.cost[y..y + 4].chunks_exact_mut(2).zip(terms) {
-                    for row in rows {
-                        let cost = L::load(row);
-                        L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost).store(row);
-                    }
-                }
+                let two = L::doubled(geometric_term(g, at, w, level.geometric_weight));
+                terms[y / 2] = two[0];
+                terms[y / 2 + 1] = two[1];
             }
+        }
+        correlation::of_tile::<L>(patch, &scratch.warped, &mut scratch.cost);
+        if coverage == Coverage::Part {
+            reject_outside::<L>(&scratch.valid, &mut scratch.cost);
         }
         if let Some(labels) = &source.labels {
             for y in 0..TILE_H {
@@ -108,15 +115,22 @@ fn data_cost<L: Lanes>(tile: &mut Tile, level: &Level, plane: InversePlane) -> b
                 L::select(cost.lt(L::splat(ROBUST_COST)), cost + term, cost).store(&mut scratch.cost[y]);
             }
         }
-        let mut sum = L::splat(0.0);
+        let (mut sum, with_terms) = (L::splat(0.0), source.geometry.is_some());
         for y in 0..TILE_H {
-            let cost = L::load(&scratch.cost[y]);
+            let mut cost = L::load(&scratch.cost[y]);
+            if with_terms {
+                cost = L::select(cost.lt(L::splat(ROBUST_COST)), cost + terms[y / 2], cost);
+            }
             let (best, second) = (L::load(&scratch.best[y]), L::load(&scratch.second[y]));
             second.min(best.max(cost)).store(&mut scratch.second[y]);
             best.min(cost).store(&mut scratch.best[y]);
-            sum = sum + cost;
+            if ranks {
+                sum = sum + cost;
+            }
         }
-        view_cost[k] = sum.sum() / (TILE_W * TILE_H) as f32;
+        if ranks {
+            view_cost[k] = sum.sum() / (TILE_W * TILE_H) as f32;
+        }
     }
     any
 }

@@ -2,8 +2,9 @@
 
 use super::correlation::{SumRows, finish, merged, of_samples};
 use super::geometric::geometric_term;
+use super::homographies::{FIXED, SMOOTH};
 use super::label::label_term;
-use super::warp::{FIXED, MIN_DEPTH_RATIO, SMOOTH, clamped, texels};
+use super::warp::{MIN_DEPTH_RATIO, clamped, texels};
 use super::{LANE, Lanes};
 use crate::stereo::level::{Level, Source};
 use crate::stereo::tile::{

@@ -217,20 +217,17 @@ impl Lanes for One {
     #[inline(always)]
     fn lookup<const ROWS: usize>(
         memory: &[u8],
-        first: usize,
+        (first, origin): (usize, u32),
         stride: usize,
         column: __m512i,
         row: __m512i,
     ) -> __m512i {
-        let index = unsafe {
-            let both = _mm512_and_si512(_mm512_srli_epi32::<12>(row), Self::whole(0x70));
-            let both = _mm512_or_si512(both, _mm512_srli_epi32::<16>(column));
-            let lane = _mm512_set4_epi32(0x0c0c_0c0c, 0x0808_0808, 0x0404_0404, 0);
-            _mm512_add_epi8(_mm512_shuffle_epi8(both, lane), Self::whole(0x1110_0100))
-        };
         let Some(last) = memory.len().checked_sub((ROWS - 1) * stride + 16) else { return column };
         // SAFETY: from the minimum on, `memory` holds all rows of sixteen bytes.
         unsafe {
+            let number = plus_dot(Self::whole(origin), Self::paired(column, row), Self::whole(1 | 16 << 16));
+            let lane = _mm512_set4_epi32(0x0c0c_0c0c, 0x0808_0808, 0x0404_0404, 0);
+            let index = _mm512_add_epi8(_mm512_shuffle_epi8(number, lane), Self::whole(0x1110_0100));
             let first = memory.as_ptr().add(first.min(last));
             let row = |k: usize| _mm_loadu_si128(first.add(k * stride).cast());
             let four = |k: usize| {

@@ -98,12 +98,12 @@ pub(crate) trait Lanes:
     /// Whether [`Lanes::lookup`] is there, and faster than [`Lanes::gather`].
     const LOOKUP: bool = false;
     /// The bytes at the whole parts of fixed-point columns and rows, at the next column, and at both in the next row:
-    /// as packed in words for [`Lanes::bilinear`]. `ROWS` (4 or 8) rows of sixteen bytes, `stride` apart, start at byte
-    /// `first` of `memory`; all columns are below 15 and all rows below `ROWS` − 1, and memory holds all rows.
+    /// as packed in words for [`Lanes::bilinear`]. All lie in a table of `ROWS` (4 or 8) rows of sixteen bytes, `stride`
+    /// apart in `memory`, from byte `first` on, where `column + 16·row` is `-origin`; memory holds all of it.
     #[inline(always)]
     fn lookup<const ROWS: usize>(
         _memory: &[u8],
-        _first: usize,
+        (_first, _origin): (usize, u32),
         _stride: usize,
         column: Self::Bits,
         _row: Self::Bits,
@@ -149,16 +149,7 @@ pub(crate) trait Lanes:
         y * (Self::splat(2.282_519_3) - square * (Self::splat(2.253_306_2) - square))
     }
 
-    /// A bell of unit height: close to e⁻⁸ˣ for x ≥ 0, and 0 from x = 1 on.
-    #[inline(always)]
-    fn bell(x: Self) -> Self {
-        let b = (Self::splat(1.0) - x).max(Self::splat(0.0));
-        let b = b * b;
-        let b = b * b;
-        b * b
-    }
-
-    /// A bell of unit height: closer to e⁻ˣ for x ≥ 0, and 0 from x = 64 on.
+    /// A bell of unit height: close to e⁻ˣ for x ≥ 0, and 0 from x = 64 on.
     #[inline(always)]
     fn bell64(x: Self) -> Self {
         Self::bell64_of(Self::splat(1.0) - x * Self::splat(1.0 / 64.0))
