@@ -59,7 +59,7 @@ impl Default for StereoOptions {
             levels: 2,
             iterations: 3,
             geometric_iterations: 2,
-            candidates: 10,
+            candidates: 12,
             refinements: 5,
             compared_views: 3,
             keep_cost: 1.0,
@@ -74,8 +74,8 @@ impl StereoOptions {
     pub fn of(quality: Quality) -> Self {
         let (candidates, refinements, compared_views) = match quality {
             Quality::Draft => (3, 2, 2),
-            Quality::Normal => (10, 5, 3),
-            Quality::High => (14, 10, 4),
+            Quality::Normal => (12, 5, 3),
+            Quality::High => (16, 10, 4),
         };
         StereoOptions { candidates, refinements, compared_views, ..StereoOptions::default() }
     }
