@@ -4,7 +4,7 @@ use crate::depth_filter::{DepthFilterOptions, UnbiasedFilterOptions};
 use crate::error::{Error, Result};
 
 /// "Depth Diff Threshold" that holds together what is no scrap.
-const SCRAP_DEPTH_DIFF: f32 = 0.0045;
+const SCRAP_DEPTH_DIFF: f32 = 0.004;
 
 /// Matching cost from which agreement says little. On the rendered façade 0.7 leaves a fifth of the gross errors, mostly of clouds in the
 /// sky, and 0.64 an eighth; on photographs the one costs 3 % of the points, the other 4 %.
