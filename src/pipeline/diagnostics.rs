@@ -1,9 +1,9 @@
 //! What verbose runs leave beside their results.
 
-use super::estimate::for_each_view;
 use super::filter::valid_depths;
 use super::prepare::Prepared;
 use super::resume::Plan;
+use super::schedule::for_each_view;
 use crate::error::Result;
 use crate::fusion::{FusionMaps, project_maps};
 use crate::geometry::Camera;

@@ -5,9 +5,8 @@ use super::ingredients::Recipe;
 use super::ordered_steps::OrderedSteps;
 use super::prepare::Prepared;
 use super::problem::stereo_problem;
-use super::record::with_threads;
 use super::resume::Plan;
-use super::schedule::{Schedule, Task};
+use super::schedule::{Schedule, Task, at_a_time};
 use crate::depth_filter::{fill_gaps, remove_speckles};
 use crate::error::{Error, Result};
 use crate::progress::{Event, Progress, Stage};
@@ -16,7 +15,6 @@ use crate::stereo::{self, CpuLevel, SourcePlanes, StereoOptions};
 use crate::store::byte_cache::ByteCache;
 use crate::store::depth_store::{DepthStore, Existing};
 use crate::store::memory;
-use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
@@ -175,26 +173,4 @@ impl Estimation<'_> {
             fill_gaps(estimate, &self.filter.options);
         }
     }
-}
-
-/// Works on every view, `at_once` at a time or as many as the pool has threads; stops before the next one when that is
-/// wanted.
-pub(super) fn for_each_view(
-    views: &[ViewIndex],
-    at_once: usize,
-    progress: &Progress,
-    work: impl Fn(ViewIndex) -> Result<()> + Sync + Send,
-) -> Result<()> {
-    let all = || {
-        views.par_iter().with_max_len(1).try_for_each(|&view| {
-            progress.check()?;
-            work(view)
-        })
-    };
-    at_a_time(at_once, all)
-}
-
-/// Does `all` with `at_once` threads or as many as the pool has.
-fn at_a_time(at_once: usize, all: impl FnOnce() -> Result<()> + Send) -> Result<()> {
-    if at_once < rayon::current_num_threads() { with_threads(at_once, all) } else { all() }
 }

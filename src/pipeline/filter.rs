@@ -1,9 +1,9 @@
 //! The filter across views: every depth is held against the maps of the neighbours.
 
-use super::estimate::for_each_view;
 use super::filter_job::AcrossViews;
 use super::prepare::Prepared;
 use super::resume::Plan;
+use super::schedule::for_each_view;
 use crate::depth_filter::{
     DepthFilterOptions, FilterView, MAX_NEIGHBORS, filter_consistency, filter_unbiased,
 };

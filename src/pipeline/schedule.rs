@@ -1,8 +1,11 @@
 //! Work on views in stages: a view's next stage begins when what it is made from is there, not when all views are so far.
 
+use super::record::with_threads;
 use crate::error::{Error, Result};
+use crate::progress::Progress;
 use crate::scene::ViewIndex;
 use rayon::Scope;
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -171,10 +174,31 @@ impl<W: Fn(Task) -> Result<()> + Sync, E: Fn(u32) + Sync> Running<'_, W, E> {
     }
 }
 
+/// Works on every view, `at_once` at a time or as many as the pool has threads; stops before the next one when that is
+/// wanted.
+pub(super) fn for_each_view(
+    views: &[ViewIndex],
+    at_once: usize,
+    progress: &Progress,
+    work: impl Fn(ViewIndex) -> Result<()> + Sync + Send,
+) -> Result<()> {
+    let all = || {
+        views.par_iter().with_max_len(1).try_for_each(|&view| {
+            progress.check()?;
+            work(view)
+        })
+    };
+    at_a_time(at_once, all)
+}
+
+/// Does `all` with `at_once` threads or as many as the pool has.
+pub(super) fn at_a_time(at_once: usize, all: impl FnOnce() -> Result<()> + Send) -> Result<()> {
+    if at_once < rayon::current_num_threads() { with_threads(at_once, all) } else { all() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::record::with_threads;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     const VIEWS: usize = 6;
