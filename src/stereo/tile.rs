@@ -3,7 +3,6 @@
 //! All pixels of a tile test the same plane, so that the source window is warped once for all of them
 //! (Lu et al. 2013, PatchMatch Filter; Taniai et al. 2018, local expansion moves).
 
-use super::cost::Homographies;
 use super::level::Level;
 use super::plane::InversePlane;
 use super::state::State;
@@ -140,6 +139,45 @@ pub(crate) struct Scratch {
     pub(crate) factor: TileMap,
 }
 
+/// Homographies around the centre of a tile: the source pixel of an offset `(ox, oy)` is
+/// `at + (ox·dx + oy·dy) / z` with `z = 1 + ox·z_dx + oy·z_dy`, for both coordinates.
+pub(crate) struct Homographies {
+    /// Column and row.
+    pub(crate) at: [Row; 2],
+    pub(crate) dx: [Row; 2],
+    pub(crate) dy: [Row; 2],
+    pub(crate) z_dx: Row,
+    pub(crate) z_dy: Row,
+    /// 1 where the centre is in front of the source.
+    pub(crate) in_front: Row,
+    /// 1 where the depth ratio hardly changes within the window, and all of it is inside for sure: few are inside that
+    /// fail this.
+    pub(crate) well_inside: Row,
+    /// Whole part of `at`.
+    pub(crate) pixel: [Words; 2],
+    /// Rows of sixteen source pixels that hold sixteen texels and their neighbours where a window is well inside: 4, 8, or 0
+    /// if they do not.
+    pub(crate) rows: Row,
+    /// Column and row of such windows, in fixed point.
+    pub(crate) quadratic: [Quadratic; 2],
+}
+
+/// A coordinate in fixed point where it is quadratic in the offset: `at + (ox·dx + oy·dy)·(1 − e)` with
+/// `e = ox·z_dx + oy·z_dy`.
+pub(crate) struct Quadratic {
+    pub(crate) at: Row,
+    pub(crate) dx: Row,
+    pub(crate) dy: Row,
+    /// Change over two rows at the centre, and how it changes by column and by row.
+    pub(crate) step: Row,
+    pub(crate) step_dx: Row,
+    pub(crate) step_dy: Row,
+    /// Its change over two rows, a whole number.
+    pub(crate) bend: Words,
+    /// The low end of where the texels of a vector are whose first one is at the centre.
+    pub(crate) corner: Row,
+}
+
 /// The working set of one tile.
 pub(crate) struct Tile {
     /// Column of the first pixel; may be negative.
@@ -165,6 +203,34 @@ const ZERO_TILE: TileMap = [ZERO_ROW; TILE_H];
 const ZERO_HALO: HaloMap = [[0.0; 3 * TILE_W]; TILE_H + 2];
 const ZERO_WIN: [WinRow; WIN_H] = [[0.0; WIN_W]; WIN_H];
 const ZERO_WORDS: [WinWords; WIN_H] = [[0; WIN_W]; WIN_H];
+
+impl Quadratic {
+    const ZERO: Self = Quadratic {
+        at: ZERO_ROW,
+        dx: ZERO_ROW,
+        dy: ZERO_ROW,
+        step: ZERO_ROW,
+        step_dx: ZERO_ROW,
+        step_dy: ZERO_ROW,
+        bend: [0; TILE_W],
+        corner: ZERO_ROW,
+    };
+}
+
+impl Homographies {
+    const NONE: Self = Homographies {
+        at: [ZERO_ROW; 2],
+        dx: [ZERO_ROW; 2],
+        dy: [ZERO_ROW; 2],
+        z_dx: ZERO_ROW,
+        z_dy: ZERO_ROW,
+        in_front: ZERO_ROW,
+        well_inside: ZERO_ROW,
+        pixel: [[0; TILE_W]; 2],
+        rows: ZERO_ROW,
+        quadratic: [Quadratic::ZERO; 2],
+    };
+}
 
 impl Tile {
     /// A tile of zeros on the heap.

@@ -13,7 +13,6 @@ mod x86;
 use super::level::Level;
 use super::plane::InversePlane;
 use super::tile::Tile;
-pub(crate) use kernels::Homographies;
 
 /// Lanes of what every processor of the architecture has.
 #[cfg(target_arch = "x86_64")]

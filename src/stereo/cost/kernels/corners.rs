@@ -1,8 +1,8 @@
 //! Where in the source the texels of a vector lie, so that they can be looked up in a few of its rows.
 
 use super::Lanes;
-use super::homographies::{COLUMNS, HALF, Homographies, Quadratic};
-use crate::stereo::tile::{Row, TILE_W, WIN_H};
+use super::homographies::{COLUMNS, HALF};
+use crate::stereo::tile::{Homographies, Quadratic, Row, TILE_W, WIN_H};
 
 /// Vectors of a column of the window.
 pub(super) const STEPS: usize = WIN_H / 2;

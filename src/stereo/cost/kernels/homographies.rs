@@ -3,7 +3,7 @@
 use super::Lanes;
 use crate::stereo::level::Transfers;
 use crate::stereo::plane::InversePlane;
-use crate::stereo::tile::{CENTRE, Row, TILE_W, WIN_H, WIN_W, Words};
+use crate::stereo::tile::{CENTRE, Homographies, Quadratic, TILE_W, WIN_H, WIN_W};
 
 /// Half the extent of the window.
 pub(super) const HALF: (f32, f32) = ((WIN_W as f32 - 1.0) / 2.0, (WIN_H as f32 - 1.0) / 2.0);
@@ -17,59 +17,7 @@ const SLACK: f32 = 0.02;
 /// Columns of the window in one vector, of two rows.
 pub(super) const COLUMNS: usize = TILE_W / 2;
 
-const ZERO: Row = [0.0; TILE_W];
-
-/// Homographies around the centre of a tile: the source pixel of an offset `(ox, oy)` is
-/// `at + (ox·dx + oy·dy) / z` with `z = 1 + ox·z_dx + oy·z_dy`, for both coordinates.
-pub(crate) struct Homographies {
-    /// Column and row.
-    pub(super) at: [Row; 2],
-    pub(super) dx: [Row; 2],
-    pub(super) dy: [Row; 2],
-    pub(super) z_dx: Row,
-    pub(super) z_dy: Row,
-    /// 1 where the centre is in front of the source.
-    pub(super) in_front: Row,
-    /// 1 where the depth ratio hardly changes within the window, and all of it is inside for sure: few are inside that
-    /// fail this.
-    pub(super) well_inside: Row,
-    /// Whole part of `at`.
-    pub(super) pixel: [Words; 2],
-    /// Rows of sixteen source pixels that hold sixteen texels and their neighbours where a window is well inside: 4, 8, or 0
-    /// if they do not.
-    pub(super) rows: Row,
-    /// Column and row of such windows, in fixed point.
-    pub(super) quadratic: [Quadratic; 2],
-}
-
-/// A coordinate in fixed point where it is quadratic in the offset: `at + (ox·dx + oy·dy)·(1 − e)` with
-/// `e = ox·z_dx + oy·z_dy`.
-pub(crate) struct Quadratic {
-    pub(super) at: Row,
-    pub(super) dx: Row,
-    pub(super) dy: Row,
-    /// Change over two rows at the centre, and how it changes by column and by row.
-    pub(super) step: Row,
-    pub(super) step_dx: Row,
-    pub(super) step_dy: Row,
-    /// Its change over two rows, a whole number.
-    pub(super) bend: Words,
-    /// The low end of where the texels of a vector are whose first one is at the centre.
-    pub(super) corner: Row,
-}
-
 impl Quadratic {
-    const ZERO: Self = Quadratic {
-        at: ZERO,
-        dx: ZERO,
-        dy: ZERO,
-        step: ZERO,
-        step_dx: ZERO,
-        step_dy: ZERO,
-        bend: [0; TILE_W],
-        corner: ZERO,
-    };
-
     /// The low end of its footprint in pixels is `low`.
     #[inline(always)]
     fn fill<L: Lanes>(&mut self, at: L, (dx, dy): (L, L), (z_dx, z_dy): (L, L), low: L) {
@@ -88,19 +36,6 @@ impl Quadratic {
 }
 
 impl Homographies {
-    pub(crate) const NONE: Self = Homographies {
-        at: [ZERO; 2],
-        dx: [ZERO; 2],
-        dy: [ZERO; 2],
-        z_dx: ZERO,
-        z_dy: ZERO,
-        in_front: ZERO,
-        well_inside: ZERO,
-        pixel: [[0; TILE_W]; 2],
-        rows: ZERO,
-        quadratic: [Quadratic::ZERO; 2],
-    };
-
     /// Those of plane `p` of the tile at `(x0, y0)`, anchored at its centre.
     #[inline(always)]
     pub(super) fn fill<L: Lanes>(&mut self, to: &Transfers, (x0, y0): (i32, i32), p: InversePlane) {

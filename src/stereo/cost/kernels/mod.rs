@@ -20,7 +20,6 @@ use crate::stereo::level::Level;
 use crate::stereo::plane::InversePlane;
 use crate::stereo::tile::{CENTRE, REACH, ROBUST_COST, Row, TILE_H, TILE_W, Tile, TileMap, UNSEEN, WinRow};
 use geometric::geometric_term;
-pub(crate) use homographies::Homographies;
 use label::label_term;
 use smoothness::PlaneVector;
 use warp::{Coverage, warp};

@@ -2,9 +2,9 @@
 
 use super::Lanes;
 use super::corners::{Corners, STEPS};
-use super::homographies::{COLUMNS, FIXED, HALF, Homographies, Quadratic};
+use super::homographies::{COLUMNS, FIXED, HALF};
 use crate::stereo::level::Source;
-use crate::stereo::tile::{Row, Scratch, TILE_W, WIN_H, WIN_W, WinRow, WinWords};
+use crate::stereo::tile::{Homographies, Quadratic, Row, Scratch, TILE_W, WIN_H, WIN_W, WinRow, WinWords};
 
 /// Depth ratio, corner of a window to its centre, below which a window is behind or beside the source.
 pub(super) const MIN_DEPTH_RATIO: f32 = 0.3;
